@@ -8,6 +8,7 @@ F is read in the units in force *before* a G20 or G21 on its line. Rows that are
 goes on with the next line, so that `info` can show them all.
 """
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -85,6 +86,8 @@ class Interpreter:
         self.two_axes = False  # the program has X and Z and no Y, and was not found to be one for a lathe
         self.by_word = 0  # rows that were executed word by word, not by the compiled loop
         self._timed = False  # a feed is in inverse time
+        # before what is executed aside, and the place of the cycle that reads it; None while nothing is
+        self.aside: tuple[State, BlockTable, tuple[int, int, int]] | None = None
         self._words: Words | None = None  # of the last chunk
         self._begun = False
         self.rows_read = 0  # of the last chunk, up to the end of the program
@@ -114,9 +117,21 @@ class Interpreter:
         read = dataclasses.replace(read, limits=limits)
         return read if self.findings.faults else at_the_tip(read, self.tool_point, self.machine)
 
-    def go_on_with(self, state: State, table: BlockTable) -> None:
-        """Execute what follows in another `state` and into another `table`: a profile that is read aside."""
-        self.mover.state, self.mover.table = state, table
+    def read_aside(self, place: tuple[int, int, int]) -> None:
+        """What follows is executed aside: a profile that the cycle at a place reads. Raises ValueError in one."""
+        if self.aside is not None:
+            raise ValueError("a cycle stands in the profile of another one; write it behind that")
+        self.aside = copy.deepcopy(self.state), self.table, place
+        self.mover.table = BlockTable(len(self.state.letters))
+        # any feed does: moves whose feed depends on the diameter are divided
+        self.state.feed_mode, self.state.feed, self.state.uncompensated = "per minute", 1.0, True
+
+    def take_back(self) -> tuple[int, int, int] | None:
+        """End what is executed aside, if anything is; the place of its cycle."""
+        if self.aside is None:
+            return None
+        (self.mover.state, self.mover.table, place), self.aside = self.aside, None
+        return place
 
     @property
     def notes(self) -> Notes:

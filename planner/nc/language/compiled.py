@@ -56,11 +56,12 @@ def compile_procedures(
     """
     found = Compiled()
     text: list[str] = []
+    makers: list[Callable[..., object]] = []
     for k, procedure in enumerate(procedures):
-        for line, place in _Function(procedure, language, rows).source(f"p{k}"):
+        for line, place in _Function(procedure, language, rows, makers).source(f"p{k}"):
             text.append(line)
             found.places.append(place)
-    namespace: dict[str, object] = {"whole": whole, "turns_of": turns_of, **FUNCTIONS}
+    namespace: dict[str, object] = {"whole": whole, "turns_of": turns_of, "M": makers, **FUNCTIONS}
     exec(compile("\n".join(text), marker, "exec"), namespace)
     for k, procedure in enumerate(procedures):
         found.functions[procedure.name] = namespace[f"p{k}"]  # type: ignore[assignment]
@@ -68,8 +69,14 @@ def compile_procedures(
 
 
 class _Function:
-    def __init__(self, procedure: tree.Procedure, language: tree.Language, rows: AppendedRows):
-        self.procedure, self.language, self.rows = procedure, language, rows
+    def __init__(
+        self,
+        procedure: tree.Procedure,
+        language: tree.Language,
+        rows: AppendedRows,
+        makers: list[Callable[..., object]],
+    ):
+        self.procedure, self.language, self.rows, self.makers = procedure, language, rows, makers
         self.say = Expressions(language)
         self.blocks = BasicBlocks()
         self.loops: list[tuple[str, int, int]] = []  # name, label of the next turn, label after the loop
@@ -236,7 +243,9 @@ class _Function:
 
     def _made(self, made: tree.MadeRows) -> None:
         given = "".join(f"({name!r},{self.say.value(value)})," for name, value in made.given)
-        self.blocks.put(f"run.made({made.maker!r},({given}),{tuple(made.place)!r})", made.place)
+        self.makers.append(made.maker)
+        text = f"run.made(M[{len(self.makers) - 1}],({given}),{tuple(made.place)!r})"
+        self.blocks.put(text, made.place)
 
 
 _WRITE: dict[type, Callable[..., None]] = {

@@ -13,7 +13,7 @@ from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.travel import Travel
 from planner.nc.language.travel_rows import TravelRow
-from planner.nc.language.tree import ZERO, MadeRows, SourcePlace, made
+from planner.nc.language.tree import MadeRows, SourcePlace, made
 
 ASSUMED = {
     "acceleration": "BRISK and DRIVE are not followed: acceleration and jerk are those of the machine file",
@@ -45,8 +45,8 @@ BREAK = 0.2  # mm by which the tool goes back to break a chip, and above the dep
 
 def assumed_row(place: SourcePlace, name: str) -> MadeRows:
     """The statement that says a sentence of ASSUMED, and is refused by strict reading."""
-    assert name in ASSUMED
-    return made(place, "assume", **{name: ZERO})
+    text = ASSUMED[name]
+    return made(place, lambda making, given: making.assume(text))
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,11 @@ class Making:
         """mm per unit of the program."""
         return self.interpreter.state.unit
 
+    @property
+    def absolute(self) -> bool:
+        """True under G90."""
+        return self.travel.absolute if self.travel.active else self.interpreter.state.absolute
+
     def here(self) -> tuple[float, float, float]:
         """The position in the program's coordinates and unit."""
         x, y, z = self.travel.position() / self.unit
@@ -107,8 +112,8 @@ class Making:
 
 def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
     """The rows of a cycle under G90, then G91, the motion code and with `feed` the feed as before."""
-    state, travel = making.interpreter.state, making.travel
-    absolute, motion = (travel.absolute, travel.motion) if travel.active else (state.absolute, state.motion)
+    state, travel, absolute = making.interpreter.state, making.travel, making.absolute
+    motion = travel.motion if travel.active else state.motion
     before = state.feed * SECONDS_PER_MINUTE / making.unit if state.feed_mode == "per minute" else 0.0
     if not absolute:
         yield [("G", 90.0)]
@@ -164,6 +169,12 @@ def coarse_lead(size: float, unit: float) -> float:
 def go(z: float, feed: float | None = None) -> Row:
     """To z, at a feed or at rapid speed."""
     return [("G", 0.0), ("Z", z)] if feed is None else [("G", 1.0), ("F", feed), ("Z", z)]
+
+
+def left(hole: HolePlan) -> Iterator[Row]:
+    """From the clearance of a hole to the height where its cycle ends, if that is above it."""
+    if hole.retract > hole.clear:
+        yield go(hole.retract)
 
 
 def dwell_rows(seconds: float) -> Iterator[Row]:

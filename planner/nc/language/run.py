@@ -10,7 +10,7 @@ calls, with a sentence that names the line.
 
 import contextlib
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,7 +47,6 @@ class Dialect:
     variables : its parameters that hold the state of the control
     parser    : of a file: `parse` gives procedures, `faults` are those of its lines
     files     : names, in small letters, of the file that holds a subprogram
-    set_up    : gives a run the makers of its rows
     unknown   : what is said of a subprogram, {0}, that is not there
     """
 
@@ -55,7 +54,6 @@ class Dialect:
     variables: type[SystemVariables]
     parser: Callable[[Source], Any]
     files: Callable[[str], frozenset[str]]
-    set_up: Callable[["ProgramRun"], object] = lambda run: None
     unknown: str = "there is no such subprogram in this program or its folder"
 
 
@@ -89,22 +87,18 @@ class ProgramRun:
         self._saved: list[Modes | None] = [None]
         self._restored_at_return: list[bool] = [False]
         self._messages = 0
-        self.makers: Mapping[str, Maker] = {}  # of the rows of `tree.MadeRows`
-        # gives up a profile that a cycle of a lathe has not read to its end, and says where that stands
-        self.leave_profile: Callable[[], SourcePlace | None] = lambda: None
         self._at_once = IDLE_AT_ONCE
         self.travel = Travel(interpreter)
         self.system.travel = self.travel
         self._unknown = dialect.unknown
-        dialect.set_up(self)
 
     def start(self, main: str = "") -> ProgramFault | None:
         """Run the main program to its end; returns what stopped it before."""
         stopped = self._run(main)
-        left = self.leave_profile()
+        left = self.interpreter.take_back()
         if stopped is None and left is not None:
             text = "the program ends inside the profile of this cycle; end it behind the cycles"
-            return ProgramFault(left, text)
+            return ProgramFault(SourcePlace(*left), text)
         return stopped
 
     def _run(self, main: str) -> ProgramFault | None:
@@ -149,7 +143,8 @@ class ProgramRun:
     def _execute(self, words: Words) -> None:
         self.executed += len(words.line)
         words = self.interpreter.in_seconds(words)
-        self.tee(words)
+        if self.interpreter.aside is None:
+            self.tee(words)
         self.interpreter.execute(words)
 
     def tick(self) -> None:
@@ -265,12 +260,12 @@ class ProgramRun:
         elif not self._restored_at_return[-1]:
             raise ValueError("M72 restores the modes that M70 saved in the same call; there are none")
 
-    def made(self, maker: str, given: tuple[tuple[str, float], ...], place: tuple[int, int, int]) -> None:
+    def made(self, maker: Maker, given: tuple[tuple[str, float], ...], place: tuple[int, int, int]) -> None:
         """Execute the rows that a maker makes of values; each row a list of letters and numbers."""
         self.flush()
         state = self.interpreter, self.travel, self.shared, self.numbered
         making = Making(*state, SourcePlace(*place), self._frame, self._execute_made)
-        making.take(self.makers[maker](making, dict(given)))
+        making.take(maker(making, dict(given)))
         self.tick()
         self.flush()
 

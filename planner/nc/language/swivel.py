@@ -13,18 +13,16 @@ Sources: 840D sl, CYCLE800 (bits of MODE); TNC 640, conversational programming, 
 """
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.units import RAD_PER_DEG
+from planner.nc.language.makers import set_frame
+from planner.nc.language.making import Making
+from planner.nc.language.travel import Travel
 from planner.nc.language.travel_rows import turned
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
-
-if TYPE_CHECKING:
-    from planner.nc.language.making import Making
-    from planner.nc.language.travel import Travel
 
 _ON, _OFF = float(TOOL_POINT_ON[1]), float(TOOL_POINT_OFF[1])
 _SAME = 1e-9  # of a direction's components, which are the same then
@@ -34,7 +32,7 @@ RETRACTED = "the retraction of CYCLE800 (FR), to places that the machine's data 
 MOVED = "PLANE with MOVE turns the rotary axes where the tool stands, as with TURN"
 
 
-def siemens(making: "Making", given: Mapping[str, float]) -> None:
+def siemens(making: Making, given: Mapping[str, float]) -> None:
     """CYCLE800(FR, TC, ST, MODE, X0, Y0, Z0, A, B, C, X1, Y1, Z1, DIR ...), arguments as p0, p1 ... Raises
     ValueError."""
     mode = round(given.get("p3", 0.0))
@@ -58,16 +56,12 @@ def siemens(making: "Making", given: Mapping[str, float]) -> None:
     shift = (before + matrix @ behind) * making.unit
     _no_frame(making, matrix, shift)
     side = given.get("p13", -1.0)
-    tilt(
-        making,
-        matrix,
-        shift,
-        NO_MOVE if not given else _TURN if side else _STAY,
-        int(side) if any(angles) else 0,
-    )
+    way = NO_MOVE if not given else _TURN if side else _STAY
+    tilt(making, matrix, shift, way, int(side) if any(angles) else 0)
+    set_frame(making)
 
 
-def heidenhain(making: "Making", given: Mapping[str, float]) -> None:
+def heidenhain(making: Making, given: Mapping[str, float]) -> None:
     """PLANE and cycle 19: SPA SPB SPC, EULPR EULNU EULROT; `way` one of WAYS, `side` of SEQ. Raises
     ValueError."""
     if "EULNU" in given:
@@ -81,6 +75,7 @@ def heidenhain(making: "Making", given: Mapping[str, float]) -> None:
     if given["way"] == _MOVE:
         making.assume(MOVED)
     tilt(making, matrix, np.zeros(3), round(given["way"]), round(given.get("side", 0.0)))
+    set_frame(making)
 
 
 def euler(first: float, second: float, third: float) -> FloatArray:
@@ -88,19 +83,19 @@ def euler(first: float, second: float, third: float) -> FloatArray:
     return np.asarray(turned(first, 2) @ turned(second, 0) @ turned(third, 2), dtype=np.float64)
 
 
-def plane(making: "Making", matrix: FloatArray, shift: FloatArray, way: int, side: int) -> None:
+def plane(making: Making, matrix: FloatArray, shift: FloatArray, way: int, side: int) -> None:
     """As `tilt`, shift (3,) [mm] and matrix (3, 3), on no programmed frame. Raises ValueError."""
     _no_frame(making, matrix, shift)
     tilt(making, matrix, shift, way, side)
 
 
-def is_level(travel: "Travel") -> bool:
+def is_level(travel: Travel) -> bool:
     """True where no tilted plane is in force."""
     matrix, shift = travel.swivelled
     return not shift.any() and bool((matrix == np.eye(3)).all())
 
 
-def _no_frame(making: "Making", matrix: FloatArray, shift: FloatArray, *, turned_only: bool = False) -> None:
+def _no_frame(making: Making, matrix: FloatArray, shift: FloatArray, *, turned_only: bool = False) -> None:
     """A plane on top of a programmed frame (with `turned_only` of more than a shift). Raises ValueError."""
     frame, moved = making.travel.programmed
     framed = (frame != np.eye(3)).any() or (bool(moved.any()) and not turned_only)
@@ -110,7 +105,7 @@ def _no_frame(making: "Making", matrix: FloatArray, shift: FloatArray, *, turned
         )
 
 
-def tilt(making: "Making", matrix: FloatArray, shift: FloatArray, way: int, side: int) -> None:
+def tilt(making: Making, matrix: FloatArray, shift: FloatArray, way: int, side: int) -> None:
     """The plane p = shift + matrix p' is in force from here on, shift (3,) [mm] and matrix (3, 3). Raises
     ValueError without kinematics.
 

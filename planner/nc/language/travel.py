@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc.language.approach import Approach, Departure
+from planner.nc.language.approach import Approach, ContourWay
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
 from planner.nc.language.rows_through import RowsThrough
 
@@ -92,17 +92,19 @@ class Travel(RowsThrough):
             assume(f"tool {number} {text}")
         return radius
 
-    def approach(self, approach: Approach, assume: Callable[[str], None]) -> None:
-        """APPR: the contour begins at a point, and the way to it with its first move. Raises ValueError."""
+    def approach(self, way: ContourWay, first: FloatArray, side: int, assume: Callable[[str], None]) -> None:
+        """APPR: the contour begins at a point (3,), and the way to it with its first move; compensation is on
+        then, to the left (1) or right (-1). With 0 the path is that of a tool of radius 0 on its right. Raises
+        ValueError."""
         self._no_corner()
         if self.compensated:
             raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")
         self._begin()
-        radius = self._known_radius(assume) if approach.compensated else 0.0
-        approach.begin(self._mapped, self.mapped(approach.first), self.motion, radius, self.mirrored)
-        approach.scale = self.scale()
-        self._approach, self.lost = approach, True
-        self.place, self._mapped = approach.first.copy(), self.mapped(approach.first)
+        radius = self._known_radius(assume) if side else 0.0
+        side = (side or -1) * (-1 if self.mirrored else 1)
+        mapped = self.mapped(first)
+        self._approach = Approach(way, self._mapped.copy(), mapped, min(self.motion, 1), radius, side)
+        self.place, self._mapped, self.lost = first.copy(), mapped.copy(), True
 
     def corner(self, kind: str, size: float, line: int, *, modal: bool = False) -> None:
         """A rounding or chamfer at the end of the next move, of a size in mm; where it is `modal` there is
@@ -112,16 +114,15 @@ class Travel(RowsThrough):
         self._begin()
         self._coming = CornerMove(kind, size * self.scale(), line, modal)
 
-    def depart(self, departure: Departure) -> None:
-        """DEP: leave the contour; compensation is off behind it. Raises ValueError."""
+    def depart(self, way: ContourWay, end: FloatArray, *, raised: bool) -> None:
+        """DEP: leave the contour, for LCT to a point (3,), and with `raised` to its height; compensation is off
+        behind it. Raises ValueError."""
         self._no_corner()
         if self._offset is None or not self._offset.started:
             raise ValueError("DEP without a contour with radius compensation (RL, RR) before it")
         offset, self._offset = self._offset, None
         rows = offset.finish()
-        departure.scale = self.scale()
-        end = None if departure.end is None else self.mapped(departure.end)
-        out, there = departure.rows(offset, end)
+        out, there = way.departure(offset, self.mapped(end), raised=raised)
         self._ahead += [self._in_units(row) for row in (*rows, *out)]
         self._mapped, self._beside, self.lost = there, False, True
         self.place = self.unmapped(there)

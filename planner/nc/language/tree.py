@@ -8,9 +8,9 @@ lines with ten expressions is not parsed twice.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class SourcePlace(NamedTuple):
@@ -26,18 +26,19 @@ class Value:
 
     __slots__ = ()
 
-    def __add__(self, other: Expression) -> Expression:
+    def __add__(self, other: Expression | float) -> Expression:
+        other = number(other)
         if isinstance(self, Number) and isinstance(other, Number):
             return Number(self.value + other.value)
         return op("+", self, other)
 
-    def __sub__(self, other: Expression) -> Expression:
+    def __sub__(self, other: Expression | float) -> Expression:
         return op("-", self, other)
 
-    def __mul__(self, other: Expression) -> Expression:
+    def __mul__(self, other: Expression | float) -> Expression:
         return op("*", self, other)
 
-    def __truediv__(self, other: Expression) -> Expression:
+    def __truediv__(self, other: Expression | float) -> Expression:
         return op("/", self, other)
 
     def __neg__(self) -> Expression:
@@ -84,12 +85,22 @@ class Exists(Value):
 Expression = Number | Numbered | Named | Operation | Exists
 Parameter = Numbered | Named
 Assignments = tuple[tuple[Parameter, Expression], ...]
-ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)  # that parsers write into statements
+ZERO, ONE = Number(0.0), Number(1.0)
 
 
-def op(name: str, *operands: Value) -> Operation:
+def number(value: Expression | float) -> Expression:
+    """An expression, which a number may stand for."""
+    return Number(float(value)) if isinstance(value, int | float) else value
+
+
+def op(name: str, *operands: Value | float) -> Operation:
     """An operation by its name, on its operands."""
-    return Operation(name, operands)  # type: ignore[arg-type]
+    return Operation(name, tuple(number(operand) for operand in operands))  # type: ignore[arg-type]
+
+
+def numbered(index: int) -> Numbered:
+    """The parameter of that number."""
+    return Numbered(number(index))
 
 
 class PlainRows(NamedTuple):
@@ -128,7 +139,7 @@ class Line(NamedTuple):
 
 def word(letter: str, at: int, value: Expression | float) -> Word:
     """A word of a row, whose value may be a number."""
-    return Word(letter, at, value if isinstance(value, Value) else Number(value))
+    return Word(letter, at, number(value))
 
 
 def row(place: SourcePlace, *words: tuple[str, Expression | float], assigned: Assignments = ()) -> Line:
@@ -136,9 +147,9 @@ def row(place: SourcePlace, *words: tuple[str, Expression | float], assigned: As
     return Line(place, tuple(word(letter, place.at, value) for letter, value in words), assigned)
 
 
-def assign(place: SourcePlace, *assigned: tuple[Parameter, Expression]) -> Line:
+def assign(place: SourcePlace, *assigned: tuple[Parameter, Expression | float]) -> Line:
     """A row that only gives parameters their values, all of which are computed before."""
-    return Line(place, (), assigned)
+    return Line(place, (), tuple((parameter, number(value)) for parameter, value in assigned))
 
 
 class If(NamedTuple):
@@ -215,23 +226,22 @@ class Modes(NamedTuple):
 
 
 class MadeRows(NamedTuple):
-    """Rows that Python makes of values while the program runs, by a maker (`makers.MAKERS`)."""
+    """Rows that a function makes of values while the program runs (`making.Maker`)."""
 
     place: SourcePlace
-    maker: str
-    given: tuple[tuple[str, Expression], ...] = ()
+    maker: Callable[..., Any]
+    given: tuple[tuple[str, Expression], ...]
 
 
-def made(place: SourcePlace, maker: str, **given: Expression | float) -> MadeRows:
+def made(place: SourcePlace, maker: Callable[..., Any], **given: Expression | float) -> MadeRows:
     """Rows of a maker of values by name."""
-    values = ((name, v if isinstance(v, Value) else Number(float(v))) for name, v in given.items())
-    return MadeRows(place, maker, tuple(values))
+    return MadeRows(place, maker, tuple((name, number(value)) for name, value in given.items()))
 
 
 def repeated(place: SourcePlace, counter: Named, times: Expression, label: int) -> If:
     """Go back to a label so many times; the counter is 0 before and behind it."""
-    again: list[Statement] = [assign(place, (counter, counter + ONE)), Goto(place, Number(float(label)))]
-    return If(place, ((op("LT", counter, times), again),), [assign(place, (counter, ZERO))])
+    again: list[Statement] = [assign(place, (counter, counter + 1)), Goto(place, number(label))]
+    return If(place, ((op("LT", counter, times), again),), [assign(place, (counter, 0))])
 
 
 @dataclass

@@ -58,7 +58,7 @@ def statements(code: str, words: tree.Words, line: SourceLine) -> tuple[list[tre
         raise line.fault(
             "G68 with I J K turns about an axis in space, which tilts the plane; write the moves out"
         )
-    return [tree.made(line.place, code, **given)], rest
+    return [tree.made(line.place, MAKERS[code], **given)], rest
 
 
 def _scale(word: tree.Word, line: SourceLine) -> tree.Expression:
@@ -73,9 +73,8 @@ def _scale(word: tree.Word, line: SourceLine) -> tree.Expression:
 def _set(making: Making, code: str, given: Mapping[str, float]) -> None:
     travel, state = making.travel, making.interpreter.state
     parts, here, plane = travel.parts, travel.position(), IN_PLANE[state.normal]
-    centre = here.copy()
+    centre, absolute = here.copy(), making.absolute
     named = [axis for axis, letter in enumerate(AXES) if letter in given]
-    absolute = travel.absolute if travel.active else state.absolute
     for axis in named:
         centre[axis] = given[AXES[axis]] * making.unit + (0.0 if absolute else here[axis])
     if code == "G68":
@@ -145,9 +144,8 @@ def _to_plane(making: Making, given: Mapping[str, float]) -> None:
 
 def _polar(making: Making, given: Mapping[str, float]) -> None:
     """G16."""
-    travel, state = making.travel, making.interpreter.state
-    absolute = travel.absolute if travel.active else state.absolute
-    travel.set_polar(0j if absolute else in_plane(travel.position(), state.normal))
+    here = in_plane(making.travel.position(), making.interpreter.state.normal)
+    making.travel.set_polar(0j if making.absolute else here)
 
 
 def _round_pocket(making: Making, given: Mapping[str, float], *, turning: int) -> Iterator[Row]:
@@ -173,9 +171,7 @@ def _round_pocket(making: Making, given: Mapping[str, float], *, turning: int) -
 
 
 def _circles(making: Making, given: Mapping[str, float], sizes: list[float], turning: int) -> Iterator[Row]:
-    travel, state = making.travel, making.interpreter.state
-    absolute = travel.absolute if travel.active else state.absolute
-    x, y, z = making.here()
+    absolute, (x, y, z) = making.absolute, making.here()
     if "X" in given or "Y" in given:
         x, y = (given[c] + (0.0 if absolute else v) if c in given else v for c, v in (("X", x), ("Y", y)))
         yield [("G", 0.0), ("X", x), ("Y", y)]

@@ -10,8 +10,8 @@ import numpy as np
 
 from planner.nc.integers import LENGTHS
 from planner.nc.language import tree
+from planner.nc.language.fanuc import lathe_cycles
 from planner.nc.language.fanuc.calls import LANGUAGE, fanuc_files
-from planner.nc.language.fanuc.lathe_cycles import LatheCycles
 from planner.nc.language.fanuc.lathe_words import LatheVariables, LatheWords, absolute, of_shared, shared
 from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source, SourceLine
@@ -21,10 +21,21 @@ _NUMBER = re.compile(r"/?\d?N(\d+)", re.IGNORECASE)
 _AFTER = 1_000_000_000  # label behind the last block of a profile: its number and this
 # Words of cycles that are in least increments where they have no point; of others D is.
 _INCREMENTS = {"G74": "PQ", "G75": "PQ", "G76": "PQRDIK", "G83": "Q"}
+# Words of profile cycles by their letters in the first of two blocks, and what is said without the depth of a pass.
+_OF_FIRST_BLOCK = {
+    "G71": {"D": "U", "R": "R"},
+    "G72": {"D": "W", "R": "R"},
+    "G73": {"I": "U", "K": "W", "D": "R"},
+}
+_NO_DEPTH = {
+    **{
+        cycle: f"the depth of a pass is not given: D, or {c} in a block before this one ({c}2. R0.5)"
+        for cycle, c in (("G71", "U"), ("G72", "W"))
+    },
+    "G73": "G73 needs the number of its passes: D, or R in a block before this one",
+}
 # The least increment in the program's unit, 0.001 mm or 0.0001 inch: #4006 is 20 under G20 and 21 under G21.
-_INCREMENT = tree.Number(1e-4) + (tree.Numbered(tree.Number(4006.0)) - tree.Number(20.0)) * tree.Number(
-    1e-3 - 1e-4
-)
+_INCREMENT = tree.number(1e-4) + (tree.numbered(4006) - 20) * (1e-3 - 1e-4)
 
 
 class LatheParser(LatheWords):
@@ -69,7 +80,7 @@ class LatheParser(LatheWords):
         begun = [pair for pair in self.pairs if pair[0] == number]
         for pair in begun:
             if pair in self.called:  # its cycle has made it: what follows is behind it
-                self.body.append(tree.Goto(line.place, tree.Number(float(_AFTER + pair[1]))))
+                self.body.append(tree.Goto(line.place, tree.number(_AFTER + pair[1])))
         for pair in begun:
             self.profiles.setdefault(pair, (self.body, len(self.body), -1))
         super().take_line(line)
@@ -86,9 +97,8 @@ class LatheParser(LatheWords):
         given = {word.letter: word for word in words if word.letter in letters_of}
         first = not given.keys() & set("XZUWK") if cycle == "G76" else not given.keys() >= set("PQ")
         if first:  # of two blocks
-            lengths = "QR" if cycle == "G76" else "UWR"
             self.waiting[cycle] = {
-                letter: self._length(word, cycle, line) if letter in lengths else word.value
+                letter: word.value if letter == "P" else self._length(word, cycle, line)
                 for letter, word in given.items()
             }
             return
@@ -110,37 +120,18 @@ class LatheParser(LatheWords):
         name = _profile_name(profile)
         call = tree.Call(line.place, name, None, f"{cycle} P{profile[0]} Q{profile[1]}")
         if cycle == "G70":
-            self.body += [tree.made(line.place, "start"), call, tree.made(line.place, "back")]
+            start, back = (tree.made(line.place, maker) for maker in (lathe_cycles.start, lathe_cycles.back))
+            self.body += [start, call, back]
             return
-        measured = {letter: self._length(word, cycle, line) for letter, word in given.items()}
-        values = self._pattern(measured, line) if cycle == "G73" else self._removal(cycle, measured, line)
-        self.body += [shared(values, line), tree.made(line.place, "profile"), call]
-        self.body.append(of_shared(line.place, cycle, values))
-
-    def _removal(
-        self, cycle: str, given: dict[str, tree.Expression], line: SourceLine
-    ) -> dict[str, tree.Expression]:
-        """G71 (depth in U of its first block) and G72 (in W)."""
-        depth, before = "U" if cycle == "G71" else "W", self.waiting.get(cycle, {})
-        values = {letter: given[letter] for letter in "UWIK" if letter in given}
-        if "D" not in given and depth not in before:
-            remedy = f"D, or {depth} in a block before this one ({depth}2. R0.5)"
-            raise line.fault(f"the depth of a pass is not given: {remedy}")
-        values["D"] = given["D"] if "D" in given else before[depth]
-        if "R" in before:
-            values["R"] = before["R"]
-        return values
-
-    def _pattern(self, given: dict[str, tree.Expression], line: SourceLine) -> dict[str, tree.Expression]:
-        before = self.waiting.get("G73", {})
-        values = {letter: given[letter] for letter in "UW" if letter in given}
-        for letter, first in (("I", "U"), ("K", "W"), ("D", "R")):
-            found = given.get(letter, before.get(first))
-            if found is not None:
-                values[letter] = found
+        values = {letter: self._length(given[letter], cycle, line) for letter in "UWIKD" if letter in given}
+        before = self.waiting.get(cycle, {})
+        for letter, first_letter in _OF_FIRST_BLOCK[cycle].items():
+            if letter not in values and first_letter in before:
+                values[letter] = before[first_letter]
         if "D" not in values:
-            raise line.fault("G73 needs the number of its passes: D, or R in a block before this one")
-        return values
+            raise line.fault(_NO_DEPTH[cycle])
+        self.body += [shared(values, line), tree.made(line.place, lathe_cycles.read_profile), call]
+        self.body.append(of_shared(line.place, cycle, values))
 
     def _thread(self, given: dict[str, tree.Word], line: SourceLine) -> None:
         values = {letter: self._length(word, "G76", line) for letter, word in given.items()}
@@ -152,7 +143,7 @@ class LatheParser(LatheWords):
             if first is None or "P" not in given or "Q" not in given:
                 raise line.fault("G76 needs K and D, or P and Q with a block G76 P Q R before it")
             values = {**values, "K": values["P"], "D": values["Q"], **_finishing(first, line)}
-            values["I"] = self._length(given["R"], "G76", line) if "R" in given else tree.Number(0.0)
+            values["I"] = self._length(given["R"], "G76", line) if "R" in given else tree.ZERO
         else:
             if "D" not in given:
                 raise line.fault("G76 needs D, the depth of the first pass")
@@ -162,7 +153,7 @@ class LatheParser(LatheWords):
             self.body.append(tree.Message(line.place, (text,)))
         values = {letter: value for letter, value in absolute(values).items() if letter in "XZKDQRLAIE"}
         values["F"] = self.feed
-        self.body.append(tree.made(line.place, "G76", **values))
+        self.body.append(tree.made(line.place, lathe_cycles.thread, **values))
         self.threading = False
 
     def _length(self, word: tree.Word, cycle: str, line: SourceLine) -> tree.Expression:
@@ -181,7 +172,7 @@ class LatheParser(LatheWords):
 
 def _finishing(first: dict[str, tree.Expression], line: SourceLine) -> dict[str, tree.Expression]:
     """The first block of G76: P mmrraa has the cuts at full depth, ten chamfers in leads, the angle."""
-    digits = first.get("P", tree.Number(10_000.0))
+    digits = first.get("P", tree.number(10_000))
     if (
         not isinstance(digits, tree.Number)
         or digits.value != int(digits.value)
@@ -191,7 +182,7 @@ def _finishing(first: dict[str, tree.Expression], line: SourceLine) -> dict[str,
     often, rest = divmod(int(digits.value), 10_000)
     chamfer, angle = divmod(rest, 100)
     values = {"L": float(max(often, 1)), "E": chamfer / 10.0, "A": float(angle)}
-    found: dict[str, tree.Expression] = {letter: first.get(letter, tree.Number(0.0)) for letter in "QR"}
+    found: dict[str, tree.Expression] = {letter: first.get(letter, tree.ZERO) for letter in "QR"}
     return found | {letter: tree.Number(value) for letter, value in values.items()}
 
 
@@ -203,4 +194,4 @@ def _profile_name(pair: tuple[int, int]) -> str:
     return f"profile N{pair[0]} to N{pair[1]}"
 
 
-DIALECT = Dialect(LANGUAGE, LatheVariables, LatheParser, fanuc_files, LatheCycles)
+DIALECT = Dialect(LANGUAGE, LatheVariables, LatheParser, fanuc_files)

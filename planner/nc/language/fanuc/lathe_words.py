@@ -9,6 +9,7 @@ G50 with coordinates are refused.
 from collections.abc import Iterable
 
 from planner.nc.language import tree
+from planner.nc.language.fanuc.lathe_cycles import MAKERS
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.making import assumed_row
 from planner.nc.language.source import Source, SourceLine
@@ -16,7 +17,7 @@ from planner.nc.language.system_variables import FanucVariables
 
 CYCLES = ("G70", "G71", "G72", "G73", "G76")
 # Parameters that hold the end of the last block.
-X_HERE, Z_HERE = tree.Numbered(tree.Number(5001.0)), tree.Numbered(tree.Number(5002.0))
+X_HERE, Z_HERE = tree.numbered(5001), tree.numbered(5002)
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 # Drilling cycles along z, and which they are on mills.
 DRILLS = {f"G{n}": float(n) for n in (81, 82, 83, 84, 85, 86, 89)} | {"G184": 74.0}
@@ -34,12 +35,10 @@ _REFUSED = {
 CUTS = {"G90": "turning", "G92": "threading", "G94": "facing"}
 PECKS = ("G74", "G75")
 # Codes behind which a cut is not repeated: other motions and cycles.
-_MOTIONS = {
-    *(f"G{n}" for n in (0, 1, 2, 3, 32, 33, 34, *range(70, 77), *range(80, 90), 184)),
-    *(f"G0{n}" for n in range(4)),
-}
+_MOTIONS = {f"G{n}" for n in (0, 1, 2, 3, 32, 33, 34, *range(70, 77), *range(80, 90), 184)}
+_LINES_AND_ARCS = {"G0", "G1", "G2", "G3"}
 # Codes whose coordinates are their own.
-_OWN_COORDINATES = {"G4", "G04", "G10", "G28", "G30", "G50", "G53"}
+_OWN_COORDINATES = {"G4", "G10", "G28", "G30", "G50", "G53"}
 _PLACE = "XZUW"
 
 
@@ -84,8 +83,8 @@ class LatheWords(FanucParser):
         self.feed = given.get("F", self.feed)
         if self._single(words, codes, line) or self._drilling(words, codes, line):
             return
-        if codes & {"G0", "G00", "G1", "G01", "G2", "G02", "G3", "G03"} or "G32" in codes:
-            self.feeding = bool(codes & {"G1", "G01"})
+        if codes & (_LINES_AND_ARCS | {"G32"}):
+            self.feeding = "G1" in codes
         if self.feeding and not codes & _OWN_COORDINATES:
             words = self._corner_words(words)
         cycle = next((code for code in CYCLES if code in codes), "")
@@ -117,26 +116,31 @@ class LatheWords(FanucParser):
         """Read a line with a drilling cycle, or one more hole of it; False if it is none. They lie along z, as
         in G17, and end where they began (G98)."""
         named = next((code for code in DRILLS if code in codes), "")
+        others = sorted(codes & (_MOTIONS - DRILLS.keys() - {"G80"}))
+        if named and others:
+            text = f"{others[0]} and {named} on one line are both motions; write one of them, or two lines"
+            raise line.fault(text)
         if codes & (_MOTIONS - DRILLS.keys()):
             self.drill = ""
         if not named and (
             not self.drill or codes & _OWN_COORDINATES or not {w.letter for w in words} & set(_PLACE)
         ):
             return False
-        self.drill = named or self.drill
+        drill = named or self.drill
         own = {word.letter: word for word in words if word.letter in _PLACE + "RQPKL"}
         self._rest(tuple(word for word in words if word.code != named), set(own), line)
+        self.drill = drill
         given = {letter: self._length(word, "G83", line) for letter, word in own.items()}
         level = given.get("R", Z_HERE)
         if "W" in given:
             given["Z"] = level + given.pop("W")
         values = absolute(given) | ({"R": level} if named or "R" in given else {})
-        turning = [("M", _TURNING[self.drill])] if self.drill in _TURNING and named else []
+        turning = [("M", _TURNING[drill])] if drill in _TURNING and named else []
         at = {letter: word.at for letter, word in own.items()}
         start = [
             tree.word(letter, line.place.at, value) for letter, value in (("G", 17.0), ("G", 98.0), *turning)
         ]
-        cycle = tree.word("G", line.place.at, DRILLS[self.drill])
+        cycle = tree.word("G", line.place.at, DRILLS[drill])
         holes = (
             tree.Word("L" if c == "K" else c, at.get(c, line.place.at), value) for c, value in values.items()
         )
@@ -152,7 +156,7 @@ class LatheWords(FanucParser):
             axis, here = ("X", X_HERE) if letter == "U" else ("Z", Z_HERE)
             return word._replace(letter=axis, value=here + word.value)
         if letter == "H":
-            if word.value != tree.Number(0.0):
+            if word.value != tree.ZERO:
                 raise line.fault(
                     "H turns the spindle as the axis C, which is not planned; X and Z are", word.at
                 )
@@ -164,7 +168,7 @@ class LatheWords(FanucParser):
     def _threads(self, words: tree.Words, codes: set[str]) -> tree.Words:
         if "G32" in codes:
             self.threading = True
-        elif codes & {"G0", "G1", "G2", "G3", "G00", "G01", "G02", "G03"}:
+        elif codes & _LINES_AND_ARCS:
             self.threading = False
         if not self.threading or not any(word.letter in "XZ" for word in words):
             return words
@@ -288,7 +292,7 @@ class LatheWords(FanucParser):
                 values["D"] = of_cycle[letter].value
         if cycle in self.retract:
             values["R"] = self.retract[cycle]
-        self.body.append(tree.made(line.place, cycle, **values))
+        self.body.append(tree.made(line.place, MAKERS[cycle], **values))
         self.threading = False
 
     def _rest(self, words: tree.Words, of_cycle: set[str], line: SourceLine) -> None:
@@ -320,7 +324,7 @@ def shared(values: dict[str, tree.Expression], line: SourceLine) -> tree.Line:
 
 def of_shared(place: tree.SourcePlace, cycle: str, letters: Iterable[str]) -> tree.MadeRows:
     """A cycle of the words in shared names."""
-    return tree.made(place, cycle, **{letter: _shared(letter) for letter in letters})
+    return tree.made(place, MAKERS[cycle], **{letter: _shared(letter) for letter in letters})
 
 
 def _shared(letter: str) -> tree.Named:

@@ -9,11 +9,10 @@ no brackets. AND binds as * does, OR and XOR as + does.
 import re
 
 from planner.nc.language import tree
-from planner.nc.language.corner_moves import KINDS
 from planner.nc.language.fanuc import calls, frames
 from planner.nc.language.fanuc.calls import LANGUAGE, FanucControl
-from planner.nc.language.makers import MAKERS
-from planner.nc.language.run import Dialect, ProgramRun
+from planner.nc.language.makers import corner
+from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source, SourceLine
 from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import FanucVariables
@@ -204,7 +203,7 @@ class FanucParser(FanucControl):
         before: list[tree.Statement] = []
         for letter, kind in ((",R", "RND"), (",C", "CHR")):
             if letter in given:
-                before.append(tree.made(line.place, "corner", kind=KINDS.index(kind), size=given[letter]))
+                before.append(corner(line.place, kind, given[letter]))
         if ",A" in given:
             words = (*words, self._at_angle(given, line))
         return before, tuple(word for word in words if word.letter[0] != ",")
@@ -266,8 +265,4 @@ def _targets(texts: list[str]) -> frozenset[int] | None:
     return frozenset(used)
 
 
-def _set_up(run: ProgramRun) -> None:
-    run.makers = {**MAKERS, **frames.MAKERS}
-
-
-DIALECT = Dialect(LANGUAGE, FanucVariables, FanucParser, calls.fanuc_files, _set_up)
+DIALECT = Dialect(LANGUAGE, FanucVariables, FanucParser, calls.fanuc_files)

@@ -33,7 +33,6 @@ from planner.nc.language.making import (
     BREAK,
     Cycle,
     HolePlan,
-    Maker,
     Making,
     Pecks,
     Row,
@@ -41,6 +40,7 @@ from planner.nc.language.making import (
     drilled,
     equal_steps,
     go,
+    left,
     milled,
     pecked,
     tapped,
@@ -55,19 +55,13 @@ _OVERLAP = 1.0  # of the tool's radius between two paths, where Q370 is 0
 # Where the tool stands (Q367), in half sides.
 _CORNERS = {0: 0j, 1: -1 - 1j, 2: 1 - 1j, 3: 1 + 1j, 4: -1 + 1j}
 Given = Mapping[str, float]
-PATTERNS = (220, 221)
 _TURN = 360.0  # [degrees]
 
 
-def _hole(given: Given, feed: float = 0.0, what: str = "hole") -> HolePlan:
+def _hole(given: Given, what: str = "hole") -> HolePlan:
     top = given["Q203"]
     clear, second = top + given["Q200"], top + max(given["Q200"], given["Q204"])
-    return HolePlan(clear, top, top - abs(given["Q201"]), second, feed, given["Q211"], what)
-
-
-def _end(hole: HolePlan) -> Iterator[Row]:
-    if hole.retract > hole.clear:
-        yield go(hole.retract)
+    return HolePlan(clear, top, top - abs(given["Q201"]), second, given["Q206"], given["Q211"], what)
 
 
 def parameters(making: Making) -> dict[str, float]:
@@ -77,43 +71,39 @@ def parameters(making: Making) -> dict[str, float]:
     return {f"Q{n}": (value or 0.0) * (scale if n in _FEEDS else 1.0) for n, value in values}
 
 
-def _pecked(making: Making, given: Given, out: float = 0.0, **pecks: Any) -> Iterator[Row]:
+def _pecked(making: Making, hole: HolePlan, given: Given, out: float = 0.0, **pecks: Any) -> Iterator[Row]:
     """Cycles 1, 200, 203 and 205: by infeeds, out at a feed or, where it is 0, at rapid speed."""
-    hole, gap = _hole(given, given["Q206"]), BREAK / making.unit
+    gap = BREAK / making.unit
     usual: dict[str, Any] = {"infeed": given["Q202"], "back": given["Q256"] or gap, "ahead": (gap, gap)}
     yield from pecked(hole, Pecks(**usual | pecks))
     yield go(hole.clear, out or None)
-    yield from _end(hole)
 
 
 def _old_pecking(making: Making, given: Given) -> Iterator[Row]:
     """The tool stands at the clearance above the surface already."""
-    surface = making.shared["_z"] - given["Q200"]
-    making.numbered[203 + 1], making.numbered[204 + 1] = surface, 0.0
-    return islice(_pecked(making, parameters(making), above=given["Q210"]), 1, None)
+    making.numbered[203 + 1], making.numbered[204 + 1] = making.shared["_z"] - given["Q200"], 0.0
+    return islice(HOLES[200](making, parameters(making)), 1, None)
 
 
-def _decreasing(making: Making, given: Given, **pecks: Any) -> Iterator[Row]:
+def _decreasing(making: Making, hole: HolePlan, given: Given, **pecks: Any) -> Iterator[Row]:
     """Cycles 203 and 205."""
-    return _pecked(making, given, given["Q208"], less=given["Q212"], least=given["Q205"], **pecks)
+    return _pecked(making, hole, given, given["Q208"], less=given["Q212"], least=given["Q205"], **pecks)
 
 
-def _pecking(making: Making, given: Given) -> Iterator[Row]:
+def _pecking(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:
     if given["Q379"]:
         raise ValueError("Q379, a starting point that is drilled already, is not read")
-    return _decreasing(making, given, chip=given["Q257"], ahead=(given["Q258"], given["Q259"]))
+    return _decreasing(making, hole, given, chip=given["Q257"], ahead=(given["Q258"], given["Q259"]))
 
 
-def _at_once(making: Making, given: Given, out: float) -> Iterator[Row]:
+def _at_once(hole: HolePlan, out: float) -> Iterator[Row]:
     """Cycles 201 and 240: without infeeds, out at a feed or, where it is 0, at rapid speed."""
-    hole = _hole(given, given["Q206"])
     yield from drilled(hole)
     yield go(hole.clear, out if out > 0.0 else None)
-    yield from _end(hole)
 
 
 def _bored(making: Making, given: Given) -> Iterable[Row]:
-    hole, (x, y, _) = _hole(given, given["Q206"]), making.here()
+    hole, (x, y, _) = _hole(given), making.here()
     yield from drilled(hole)
     yield [("M", 5.0)]
     if given["Q214"]:
@@ -123,38 +113,42 @@ def _bored(making: Making, given: Given) -> Iterable[Row]:
         away = _AWAY_BY / making.unit
         yield [("G", 1.0), ("X", x + away * dx), ("Y", y + away * dy)]
     yield go(hole.clear, given["Q208"] or given["Q206"])
-    yield from _end(hole)
+    yield from left(hole)
     yield [("G", 0.0), ("X", x), ("Y", y)]
 
 
-def _tapped(making: Making, given: Given, lead: float | None = None) -> Iterable[Row]:
-    hole, speed = _hole(given), making.interpreter.state.spindle.speed
+def _tapped(making: Making, hole: HolePlan, given: Given, lead: float | None = None) -> Iterator[Row]:
+    speed = making.interpreter.state.spindle.speed
     lead = (given["Q206"] / speed if speed else 0.0) if lead is None else lead
-    yield from tapped(making, hole, lead, speed)
-    yield from _end(hole)
+    return tapped(making, hole, lead, speed)
 
 
-def _tapped_by_breaks(making: Making, given: Given) -> Iterable[Row]:
-    hole, lead, speed = _hole(given), given["Q239"], making.interpreter.state.spindle.speed
-    depth = hole.top - hole.bottom
+def _tapped_by_breaks(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:
+    lead, speed, depth = given["Q239"], making.interpreter.state.spindle.speed, hole.top - hole.bottom
     count = equal_steps(depth, given["Q257"])
     for k in range(1, count + 1):
         deep = min(k * given["Q257"], depth) if given["Q257"] else depth
         back = given["Q256"] * abs(lead)
-        last = k == count
-        up = hole.clear if last or back == 0.0 else min(hole.top - deep + back, hole.clear)
-        one = replace(hole, bottom=hole.top - deep)
-        yield from tapped(making, one, lead, speed, up=up, start=k == 1)
-    yield from _end(hole)
+        up = hole.clear if k == count or back == 0.0 else min(hole.top - deep + back, hole.clear)
+        yield from tapped(making, replace(hole, bottom=hole.top - deep), lead, speed, up=up, start=k == 1)
 
 
-def _milled(making: Making, given: Given) -> Iterable[Row]:
+def _milled(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:
     if given["Q342"]:
         raise ValueError("Q342, the diameter of a bore that is there already, is not read")
-    hole = _hole(given, given["Q206"])
     yield from milled(making, hole, given["Q335"], given["Q334"], _turning(making, given))
     yield go(hole.clear)
-    yield from _end(hole)
+
+
+def _drilling(rows: Callable[[Making, HolePlan, Given], Iterator[Row]]) -> Cycle:
+    """The cycle of a hole whose rows lead from its clearance and back to it."""
+
+    def cycle(making: Making, given: Given) -> Iterator[Row]:
+        hole = _hole(given)
+        yield from rows(making, hole, given)
+        yield from left(hole)
+
+    return cycle
 
 
 def _turning(making: Making, given: Given) -> int:
@@ -176,7 +170,7 @@ def _plan(making: Making, given: Given) -> PocketPlan:
         making.assume(text)
     making.assume("pockets: passes and allowances are those of the cycle, the single paths this reader's own")
     return PocketPlan(
-        depth=_hole(given, what="pocket"),
+        depth=_hole(given, "pocket"),
         radius=radius,
         infeed=given["Q202"],
         step=(given["Q370"] or _OVERLAP) * radius,
@@ -246,18 +240,25 @@ def _slots_on_circle(making: Making, given: Given) -> Iterable[Row]:
         yield from pocket_rows(shape, _plan(making, given), at, k * given["Q378"])
 
 
-CYCLES: dict[int, Cycle] = {
-    1: _old_pecking,
-    200: lambda making, given: _pecked(making, given, above=given["Q210"]),
-    201: lambda making, given: _at_once(making, given, given["Q208"]),
+HOLES: dict[int, Cycle] = {
+    200: _drilling(lambda making, hole, given: _pecked(making, hole, given, above=given["Q210"])),
+    201: _drilling(lambda making, hole, given: _at_once(hole, given["Q208"])),
     202: _bored,
-    203: lambda making, given: _decreasing(making, given, above=given["Q210"], breaks=round(given["Q213"])),
-    205: _pecking,
-    206: _tapped,
-    207: lambda making, given: _tapped(making, given, given["Q239"]),
-    208: _milled,
-    209: _tapped_by_breaks,
-    240: lambda making, given: _at_once(making, given, 0.0),
+    203: _drilling(
+        lambda making, hole, given: _decreasing(
+            making, hole, given, above=given["Q210"], breaks=round(given["Q213"])
+        )
+    ),
+    205: _drilling(_pecking),
+    206: _drilling(_tapped),
+    207: _drilling(lambda making, hole, given: _tapped(making, hole, given, given["Q239"])),
+    208: _drilling(_milled),
+    209: _drilling(_tapped_by_breaks),
+    240: _drilling(lambda making, hole, given: _at_once(hole, 0.0)),
+}
+CYCLES: dict[int, Cycle] = {
+    **HOLES,
+    1: _old_pecking,
     251: _rectangle,
     252: _circle,
     253: _slot,
@@ -271,7 +272,7 @@ def _look(making: Making) -> None:
     making.shared["_x"], making.shared["_y"], making.shared["_z"] = making.here()
 
 
-def _called(making: Making, given: Given) -> Iterator[Row]:
+def called(making: Making, given: Given) -> Iterator[Row]:
     """The cycle in force at the present place, and the feed as it was before."""
     cycle = round(making.shared["_cycle"])
     if cycle not in CYCLES:
@@ -290,17 +291,19 @@ def _up(making: Making) -> Iterator[Row]:
         yield go(high)
 
 
-def _pattern(making: Making, place: Callable[[Given, int], complex], count: float) -> Iterator[Row]:
+def _pattern(
+    making: Making, place: Callable[[Given, int], complex], count: Callable[[Given], float]
+) -> Iterator[Row]:
     yield from _up(making)
     given, second = parameters(making), making.numbered[204 + 1]
     if given["Q301"] == 0.0:
         making.numbered[204 + 1] = 0.0
     n = 0
-    while n < count:
+    while n < count(given):
         at = place(given, n)
         making.shared["_x"], making.shared["_y"] = at.real, at.imag
         yield [("G", 0.0), ("X", at.real), ("Y", at.imag)]
-        yield from _called(making, given)
+        yield from called(making, given)
         n += 1
     making.numbered[204 + 1] = second
     yield from _up(making)
@@ -323,18 +326,14 @@ def _on_lines(given: Given, n: int) -> complex:
     return complex(given["Q225"], given["Q226"]) + place * cmath.rect(1.0, angle)
 
 
-def _places(making: Making, given: Given) -> Iterator[Row]:
-    q = parameters(making)
-    if given["cycle"] == 220.0:
-        return _pattern(making, _on_circle, q["Q241"])
-    return _pattern(making, _on_lines, q["Q242"] * q["Q243"])
-
-
-def _raised(making: Making, given: Given) -> Iterator[Row]:
+def raised(making: Making, given: Given) -> Iterator[Row]:
     """Up to the height between places, with where the tool is now."""
     _look(making)
     yield from _up(making)
     _look(making)
 
 
-MAKERS: dict[str, Maker] = {"cycle in force": _called, "pattern": _places, "pattern up": _raised}
+PATTERNS: dict[int, Cycle] = {
+    220: lambda making, given: _pattern(making, _on_circle, lambda q: q["Q241"]),
+    221: lambda making, given: _pattern(making, _on_lines, lambda q: q["Q242"] * q["Q243"]),
+}

@@ -5,6 +5,7 @@ axes.
 """
 
 import re
+from collections.abc import Mapping
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.codes import M_GROUP
@@ -22,7 +23,7 @@ from planner.nc.language.heidenhain.text import (
     parameter,
     variable,
 )
-from planner.nc.language.making import assumed_row
+from planner.nc.language.making import Making, assumed_row
 from planner.nc.language.source import Source
 from planner.nc.language.tree import ZERO, Line, Return, row, word
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON, UNKNOWN_M, setting
@@ -57,6 +58,11 @@ def _named(block: Block, names: str, start: int, end: int) -> dict[str, tree.Exp
             raise block.fault(f"a second {name[1].upper()} in this block", at)
         found[name[1].upper()] = block.value()
     return found
+
+
+def _oversize(making: Making, given: Mapping[str, float]) -> None:
+    """DR of a tool call, by which the tool's radius is larger than in its table until the next call."""
+    making.travel.oversize = given["DR"] * making.unit
 
 
 def _not_read(cycle: int) -> str:
@@ -126,7 +132,7 @@ class Definitions(Flow):
             if more_of.get("DL", tree.ZERO) != tree.ZERO:
                 rows.append(tree.row(block.place, ("G", 43.2), ("Z", more_of["DL"])))
             if self.oversizes:
-                rows.append(tree.made(block.place, "oversize", DR=more_of.get("DR", tree.ZERO)))
+                rows.append(tree.made(block.place, _oversize, DR=more_of.get("DR", tree.ZERO)))
         if match.group(4):
             block.column = match.start(4)
             rows.append(tree.row(block.place, ("S", block.value())))
@@ -180,7 +186,7 @@ class Definitions(Flow):
             given.append((block.known(q, ""), number))
         if cycle in cycles.PATTERNS:
             self._call_cycle(block)
-            return [tree.assign(block.place, *given), tree.made(block.place, "pattern", cycle=float(cycle))]
+            return [tree.assign(block.place, *given), tree.made(block.place, cycles.PATTERNS[cycle])]
         return [tree.assign(block.place, *given, (variable("cycle"), tree.Number(float(cycle))))]
 
     def _feed_value(self, block: Block, q: int) -> tree.Expression:
@@ -229,7 +235,7 @@ class Definitions(Flow):
     def _call_cycle(self, block: Block) -> Rows:
         if not self.cycles & cycles.CYCLES.keys():
             raise block.fault("there is no drilling or milling cycle to call; write CYCL DEF 200 before")
-        return [tree.made(block.place, "cycle in force")]
+        return [tree.made(block.place, cycles.called)]
 
     def _codes(self, block: Block, given: Items, *, straight: bool = False) -> tuple[Rows, Rows, bool]:
         """Statements of M codes before and after the move, and whether it goes by machine coordinates."""

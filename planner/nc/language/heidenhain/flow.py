@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from planner.nc.language import tree
+from planner.nc.language import makers, tree
 from planner.nc.language.heidenhain.text import Block, Formula, Rows, variable
 from planner.nc.language.making import assumed_row
 
@@ -13,6 +13,7 @@ _FN_TWO = {1: "+", 2: "-", 3: "*", 4: "/", 8: "LEN", 13: "ATAN"}
 _FN_ONE = {0: "", 5: "SQRT", 6: "SIN", 7: "COS"}
 # Functions that move nothing: printing, formatted output, the PLC, waiting for it, tables, texts.
 FN_NOTHING, _FN_WAIT, _FN_ERROR = (15, 16, 19, 20, 26, 27, 29, 37, 38), 20, 14
+_ALARM = "the program raises its error (FN 14) here; run it with values that do not lead there"
 _CONTROLS = "the value is known by the control only; assign what it has there: Q1 = 5"
 FN_REFUSED = {
     18: _CONTROLS,
@@ -77,7 +78,7 @@ class Flow:
         if number in FN_NOTHING:
             return [assumed_row(block.place, "waits")] if number == _FN_WAIT else []
         if number == _FN_ERROR:
-            return [tree.MadeRows(block.place, "alarm")]
+            return [tree.made(block.place, makers.refuse(_ALARM))]
         begin, target = block.column, block.take(r"Q([LR]?)(\d+)\s*=\s*")
         if target is None or number not in {**_FN_ONE, **_FN_TWO}:
             why = FN_REFUSED.get(

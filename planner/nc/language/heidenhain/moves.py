@@ -9,10 +9,10 @@ G19 and G18 (TNC 640, conversational programming, polar coordinates).
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from planner.nc.arcs import IN_PLANE
-from planner.nc.language import swivel, tree
-from planner.nc.language.approach import KINDS
+from planner.nc.language import makers, swivel, tree
 from planner.nc.language.heidenhain import text
 
 Words = list[tuple[str, tree.Expression]]
@@ -75,11 +75,9 @@ class Moves:
             if found is None:
                 raise block.fault(f"a coordinate that lies {OUT_OF_PLANE}")
             return found
-        planes = [rows(normal) or [tree.MadeRows(block.place, "out of plane")] for normal in (0, 1)]
-        branches = tuple(
-            (tree.op("EQ", text.PLANE, tree.Number(float(n))), rows) for n, rows in enumerate(planes)
-        )
-        return [tree.If(block.place, branches, found or [tree.MadeRows(block.place, "out of plane")])]
+        none: text.Rows = [tree.made(block.place, makers.refuse(f"a coordinate that lies {OUT_OF_PLANE}"))]
+        branches = tuple((tree.op("EQ", text.PLANE, normal), rows(normal) or none) for normal in (0, 1))
+        return [tree.If(block.place, branches, found or none)]
 
     def circle(self, block: text.Block, given: text.Items, ends: Ends) -> text.Rows:
         """C: an arc about the pole, in its plane."""
@@ -128,7 +126,7 @@ class Moves:
         """CT: the arc that goes on in the direction of the last move."""
         if given.fast:
             raise block.fault(_FAST_ARC)
-        arc = tree.MadeRows(block.place, "tangent arc", (*ends.items(), *self.feed_words(block, given)))
+        arc = tree.made(block.place, makers.tangent_arc, **ends, **dict(self.feed_words(block, given)))
         return [arc, tree.assign(block.place, *_assigned(ends))]
 
     def polar(self, block: text.Block, given: text.Items) -> text.Rows:
@@ -207,7 +205,7 @@ def approach_rows(block: text.Block, moves: Moves) -> tuple[text.Rows, text.Item
     kind = block.take(r"\s*(P?)(LT|LN|CT|LCT)\b")
     if kind is None:
         raise block.wrong(f"{block.function} is followed by LT, LN, CT or LCT")
-    given: dict[str, tree.Expression | float] = {"kind": KINDS.index(kind.group(2).upper())}
+    given: dict[str, tree.Expression] = {}
     rest = block.text
     for extra in _EXTRA.finditer(block.text, kind.end()):
         block.column = extra.end()
@@ -232,15 +230,17 @@ def approach_rows(block: text.Block, moves: Moves) -> tuple[text.Rows, text.Item
     if departs:
         if found.side:
             raise block.fault("DEP switches radius compensation off; RL and RR do not belong to it", column)
-        return [*before, tree.made(block.place, "depart", **given), text.looked_up(block)], found
-    approach = tree.made(block.place, "approach", **given, side=found.side or 0)
+        made = partial(makers.depart, kind=kind[2].upper())
+        return [*before, tree.made(block.place, made, **given), text.looked_up(block)], found
+    made = partial(makers.approach, kind=kind[2].upper(), side=found.side or 0)
+    approach = tree.made(block.place, made, **given)
     return [*before, approach, tree.assign(block.place, *_assigned(ends))], found
 
 
 def frame_rows(block: text.Block, given: dict[str, tree.Expression], cycle: int) -> text.Rows:
     """A part of the frame; the position is asked for behind it, since it has other coordinates then."""
-    frame = tree.made(block.place, "heidenhain frame", cycle=cycle, **given)
-    return [frame, tree.made(block.place, "frame in force"), text.looked_up(block)]
+    frame = tree.made(block.place, partial(makers.heidenhain_frame, cycle=cycle), **given)
+    return [frame, text.looked_up(block)]
 
 
 def datum_rows(block: text.Block) -> text.Rows:
@@ -315,8 +315,7 @@ def working_plane(block: text.Block) -> text.Rows:
 
 
 def _tilted(block: text.Block, given: dict[str, tree.Expression]) -> text.Rows:
-    plane = tree.made(block.place, "plane", **given)
-    return [plane, tree.made(block.place, "frame in force"), text.looked_up(block)]
+    return [tree.made(block.place, swivel.heidenhain, **given), text.looked_up(block)]
 
 
 def _shifts(block: text.Block) -> dict[str, tree.Expression]:

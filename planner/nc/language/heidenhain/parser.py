@@ -8,8 +8,7 @@ import re
 from collections.abc import Callable
 
 from planner.nc.language import tree
-from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.heidenhain import patterns, text
+from planner.nc.language.heidenhain import cycles, patterns, text
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, files, procedure_name
 from planner.nc.language.heidenhain.moves import (
@@ -20,7 +19,7 @@ from planner.nc.language.heidenhain.moves import (
     datum_rows,
     plane_rows,
 )
-from planner.nc.language.makers import with_makers
+from planner.nc.language.makers import compensate, corner
 from planner.nc.language.making import assumed_row
 from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source
@@ -83,7 +82,7 @@ class HeidenhainParser(Definitions):
         ]
         if not source.file:
             set_up += [(one, tree.ZERO) for one in (text.X, text.Y, text.Z, *text.POLE, *text.POLAR)]
-            set_up += [(text.variable("cycle"), tree.ZERO), (text.PLANE, tree.TWO)]
+            set_up += [(text.variable("cycle"), tree.ZERO), (text.PLANE, tree.number(2))]
         name = "file" if source.file else ""
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 
@@ -187,9 +186,8 @@ class HeidenhainParser(Definitions):
         if feed and not block.take(r"AUTO\b"):
             block.value()
         block.end("nothing but a feed may follow the number of RND and CHF")
-        kind = CORNERS.index("RND" if rounded else "CHR")
         said = [assumed_row(block.place, "feed of corners")] if feed else []
-        return [*said, tree.made(block.place, "corner", kind=kind, size=number)]
+        return [*said, corner(block.place, "RND" if rounded else "CHR", number)]
 
     def _arc(self, block: text.Block) -> text.Rows:
         name, given = block.function, text.items(block)
@@ -217,7 +215,7 @@ class HeidenhainParser(Definitions):
     def _side(self, block: text.Block, given: text.Items) -> text.Rows:
         if given.side is None or not self.compensates:
             return []
-        return [tree.made(block.place, "compensate", side=given.side)]
+        return [tree.made(block.place, compensate, side=given.side)]
 
     def _approach(self, block: text.Block) -> text.Rows:
         rows, given = approach_rows(block, self.moves)
@@ -259,10 +257,10 @@ class HeidenhainParser(Definitions):
         for place in self.places:
             x, y, z = place
             rows.append(tree.assign(block.place, (surface, surface + z)))
-            rows.append(tree.made(block.place, "pattern up"))
+            rows.append(tree.made(block.place, cycles.raised))
             rows += self.moves.straight(block, text.Items(fast=True), {"X": x, "Y": y})
             rows += [*self._call_cycle(block), tree.assign(block.place, (surface, surface - z))]
-        return [*rows, tree.made(block.place, "pattern up"), text.looked_up(block), *after]
+        return [*rows, tree.made(block.place, cycles.raised), text.looked_up(block), *after]
 
     def _tool_point(self, block: text.Block) -> text.Rows:
         """FUNCTION TCPM and FUNCTION RESET TCPM, as M128 and M129."""
@@ -304,4 +302,4 @@ _READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
 }
 
 
-DIALECT = Dialect(text.LANGUAGE, PositionVariables, HeidenhainParser, files, with_makers)
+DIALECT = Dialect(text.LANGUAGE, PositionVariables, HeidenhainParser, files)

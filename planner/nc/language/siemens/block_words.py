@@ -11,11 +11,11 @@ G331 G332 G63                   tapping: in and out at lead times speed, or at F
 
 import re
 from collections.abc import Callable
+from functools import partial
 
 from planner.base.units import MM_PER_INCH
-from planner.nc.language import tree
+from planner.nc.language import makers, tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
-from planner.nc.language.makers import SIEMENS
 from planner.nc.language.making import assumed_row
 from planner.nc.language.siemens import cycles, tables
 from planner.nc.language.siemens.places import AXES, Places, Row
@@ -23,7 +23,7 @@ from planner.nc.language.siemens.text import LineTokens
 
 # G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
-_ARCS = {"CIP": "arc through", "CT": "tangent arc"}
+_ARCS = {"CIP": makers.arc_through, "CT": makers.tangent_arc}
 EACH_LINE = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
 _PLANES = {17: 2, 18: 1, 19: 0}
 _TAPS = (331, 332, 63)
@@ -69,9 +69,9 @@ class BlockWords(Places):
         row.arc, self.circular = reader.peek(-1), True
 
     def _corner(self, reader: LineTokens, row: Row) -> None:
-        kind = CORNERS.index(reader.peek(-1))
+        kind, row.corner = reader.peek(-1), True
         reader.expect("=")
-        row.before.append(tree.made(reader.place, "corner", kind=kind, size=reader.expression()))
+        row.before.append(makers.corner(reader.place, kind, reader.expression()))
 
     def _rounding(self, reader: LineTokens, row: Row) -> None:
         reader.expect("=")
@@ -117,7 +117,7 @@ class BlockWords(Places):
         if word.letter == "G" and isinstance(word.value, tree.Number):
             code = word.value.value
             if code in _SIDES:
-                row.before.insert(0, tree.made(reader.place, "compensate", side=_SIDES[int(code)]))
+                row.before.insert(0, tree.made(reader.place, makers.compensate, side=_SIDES[int(code)]))
                 return
             if code in (0.0, 1.0, 2.0, 3.0):
                 self.circular, self.turns = False, code > 1.0
@@ -135,12 +135,8 @@ class BlockWords(Places):
         if row.polar and not poles:
             self._to_polar(reader, row)
         moved = row.has("XY")
-        if (
-            moved
-            and self.rounding is not None
-            and not any(isinstance(s, tree.MadeRows) and s.maker == "corner" for s in row.before)
-        ):
-            row.before.append(tree.made(place, "corner", kind=0.0, size=self.rounding, modal=tree.ONE))
+        if moved and self.rounding is not None and not row.corner:
+            row.before.append(makers.corner(place, "RND", self.rounding, modal=True))
         if row.codes & {25.0, 26.0}:  # limits of the working area and of the spindle
             row.take("GXYZS")
         if 4.0 in row.codes:
@@ -159,7 +155,7 @@ class BlockWords(Places):
             ends_at = {
                 axis: self._absolute(axis, value) if axis in AXES else value for axis, value in given.items()
             }
-            self.body.append(tree.made(place, "tap path", code=min(taps), lead=lead, **ends_at))
+            self.body.append(tree.made(place, partial(makers.tap_path, code=min(taps)), lead=lead, **ends_at))
         if row.words or row.assigned:
             self.body.append(tree.Line(place, tuple(row.words), tuple(row.assigned)))
         if row.stops:
@@ -272,7 +268,8 @@ COMMANDS: dict[str, Callable[[BlockWords, LineTokens, Row], None]] = {
     **dict.fromkeys(("AP", "RP"), BlockWords._polar_word),
     **dict.fromkeys(("DIAMON", "DIAMOF"), BlockWords._diameters),
     **dict.fromkeys(
-        (*SIEMENS, *(f"A{name}" for name in SIEMENS)), lambda words, reader, row: words._frame(reader)
+        (name for one in makers.FRAMES for name in (one, f"A{one}")),
+        lambda words, reader, row: words._frame(reader),
     ),
     "FGROUP": BlockWords._feed_axes,
     "RNDM": BlockWords._rounding,

@@ -6,9 +6,9 @@ in shared names.
 """
 
 import re
+from functools import partial
 
-from planner.nc.language import tree
-from planner.nc.language.makers import ADDED, SIEMENS
+from planner.nc.language import makers, swivel, tree
 from planner.nc.language.siemens import cycles, patterns, tables
 from planner.nc.language.siemens.declarations import Declarations, changed
 from planner.nc.language.siemens.text import LineTokens, handed_over, position
@@ -28,8 +28,7 @@ class Commands(Declarations):
         given = self._arguments(reader)
         if name == "CYCLE800":
             values = {f"p{k}": value for k, value in enumerate(given) if value is not None}
-            self.body.append(tree.made(place, "swivel", **values))
-            self.body.append(tree.made(place, "frame in force"))
+            self.body.append(tree.made(place, swivel.siemens, **values))
         elif name == "CYCLE832":
             if given and given[0] is not None and given[0] != tree.ZERO:
                 self.body.append(tree.row(place, ("G", 64.0), ("P", given[0])))
@@ -51,7 +50,7 @@ class Commands(Declarations):
             cycles.check(name, values)
         except ValueError as fault:
             raise reader.fault(str(fault), 0) from fault
-        return [tree.made(place, name, **values)]
+        return [tree.made(place, partial(cycles.cycle_rows, name=name), **values)]
 
     def _pattern(self, reader: LineTokens) -> None:
         name = reader.peek(-1)
@@ -82,11 +81,10 @@ class Commands(Declarations):
     def _frame(self, reader: LineTokens) -> None:
         """TRANS, ROT, SCALE, MIRROR: a frame; ATRANS and the others: one beside the one before."""
         name, place = reader.peek(-1), reader.place
-        kind = SIEMENS.index(name.removeprefix("A")) + (ADDED if name.startswith("A") else 0)
         given: dict[str, tree.Expression] = {}
         while not reader.ended:
             at, token = reader.at(), reader.pop()
-            if token.text in ("TRANS", "ROT", "SCALE", "MIRROR") or token.text[0] == "G":
+            if token.text in makers.FRAMES or token.text[0] == "G":
                 reader.next -= 1
                 break
             letter = "RPL" if token.text == "RPL" and name.endswith("ROT") else token.text[0]
@@ -98,8 +96,7 @@ class Commands(Declarations):
             if value is None:
                 raise reader.fault("a text is no length", token.at)
             given[letter] = value
-        self.body.append(tree.made(place, "siemens frame", kind=kind, **given))
-        self.body.append(tree.made(place, "frame in force"))
+        self.body.append(tree.made(place, partial(makers.siemens_frame, name=name), **given))
 
     def _message(self, reader: LineTokens) -> None:
         match = re.search(r'"([^"]*)"', reader.text)

@@ -23,15 +23,15 @@ Arguments of later controls behind these change the meaning of others, where the
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.language import tree
 from planner.nc.language.making import (
     Cycle,
     HolePlan,
-    Maker,
     Making,
     Pecks,
     Row,
@@ -76,7 +76,7 @@ RADIAL = ("SLOT1", "SLOT2", "LONGHOLE")
 _APART = 1.0  # mm by which the tool goes back to break a chip, and above the depth already drilled where feed begins
 _SHORT = 1e-9  # an infeed that is none
 _LEFT = 4.0  # SDIR, SDAC: M4
-_HALT: tuple[Row, Row] = ([("M", 5.0)], [("M", 0.0)])  # the spindle stops, then the program
+Given = Mapping[str, float]
 
 
 def check(name: str, given: Mapping[str, tree.Expression]) -> None:
@@ -97,7 +97,7 @@ def check(name: str, given: Mapping[str, tree.Expression]) -> None:
             require_depth(name, given, *pair)
 
 
-def _in_seconds(making: Making, given: Mapping[str, float]) -> Mapping[str, float]:
+def _in_seconds(making: Making, given: Given) -> Given:
     """The arguments with dwells in seconds: below 0, or with 2 as their digit of AMODE, they are turns."""
     turns = [key for key in ("DTB", "DTS", "DTD") if given.get(key, 0.0) < 0.0]
     if round(given.get("AMODE", 0.0)) // 10 % 10 == 2 and given.get("DTB", 0.0) > 0.0:
@@ -108,115 +108,102 @@ def _in_seconds(making: Making, given: Mapping[str, float]) -> Mapping[str, floa
     return {**given, **{key: abs(given[key]) / speed * SECONDS_PER_MINUTE for key in turns}}
 
 
-def _lead(given: Mapping[str, float], unit: float) -> float:
+def _lead(given: Given, unit: float) -> float:
     size, lead = given.get("MPIT", 0.0), given.get("PIT", 0.0)
     if size and lead:
         raise ValueError("MPIT and PIT both give the lead; write one of them")
     return lead or (coarse_lead(abs(size), unit) * (1.0 if size > 0.0 else -1.0) if size else 0.0)
 
 
-def _rigid(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    hole = hole_of("CYCLE84", given)
-    required("CYCLE84", given, "SST")
-    yield from tapped(making, hole, _lead(given, making.unit), given["SST"], back=given.get("SST1", 0.0))
-    yield go(hole.retract)
-
-
-def _chuck(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    hole = hole_of("CYCLE840", given)
+def _tapped(making: Making, given: Given, hole: HolePlan, *, rigid: bool) -> Iterator[Row]:
+    """CYCLE84, and CYCLE840 with a chuck, at the speed of the program and without a lead at its F."""
     lead, speed = _lead(given, making.unit), making.interpreter.state.spindle.speed
+    if rigid:
+        required("CYCLE84", given, "SST")
+        return tapped(making, hole, lead, given["SST"], back=given.get("SST1", 0.0))
     if lead == 0.0 and speed > 0.0:
-        lead = making.interpreter.state.feed * 60.0 / making.unit / speed  # F and S of the program
-    yield from tapped(making, hole, lead, speed)
-    yield go(hole.retract)
+        lead = making.interpreter.state.feed * SECONDS_PER_MINUTE / making.unit / speed
+    return tapped(making, hole, lead, speed)
 
 
-def _reamed(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    hole = hole_of("CYCLE85", given)
+def _reamed(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
     required("CYCLE85", given, "FFR", "RFF")
     yield from drilled(replace(hole, feed=given["FFR"]))
     yield go(hole.clear, given["RFF"])
-    yield go(hole.retract)
 
 
-def _drilled(hole: HolePlan, given: Mapping[str, float]) -> Iterator[Row]:
+def _drilled(
+    making: Making, given: Given, hole: HolePlan, *, halts: bool = False, back: bool = False
+) -> Iterator[Row]:
+    """Down at the feed; then the spindle `halts`, and the program, or the tool goes `back` at the feed."""
     if "SDIR" in given:
         yield [("M", 4.0 if given["SDIR"] == _LEFT else 3.0)]
     yield from drilled(hole)
+    if halts:
+        yield from ([("M", 5.0)], [("M", 0.0)])
+    if back:
+        yield feed_to(hole.clear, None)
 
 
-def _bored(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-    hole, (x, y, _) = hole_of("CYCLE86", given), making.here()
+def _bored(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
+    x, y, _ = making.here()
     away = [given.get(key, 0.0) for key in ("RPA", "RPO", "RPAP")]
-    yield from _drilled(hole, given)
+    yield from _drilled(making, given, hole)
     yield [("M", 5.0)]
     yield [("G", 0.0), ("X", x + away[0]), ("Y", y + away[1]), ("Z", hole.bottom + away[2])]
     yield go(hole.clear)
     yield [("G", 0.0), ("X", x), ("Y", y), ("Z", hole.retract)]
 
 
-def _straight(name: str, *behind: Row, out: bool = False) -> Cycle:
-    """Down at the feed, then what comes `behind`, and with `out` back at the feed, else at rapid speed."""
-
-    def rows(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
-        hole = hole_of(name, given)
-        yield from _drilled(hole, given)
-        yield from behind
-        if out:
-            yield feed_to(hole.clear, None)
-        yield go(hole.retract)
-
-    return rows
-
-
-def _deep(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
-    hole, less = hole_of("CYCLE83", given), given.get("DAM", 0.0)
+def _deep(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
+    less, last, apart = given.get("DAM", 0.0), given.get("DTD", 0.0), _APART / making.unit
     if less < 0.0:
         raise ValueError(
             "DAM below 0 of CYCLE83, each infeed a share of the one before, is not read; give their difference"
         )
-    last = given.get("DTD", 0.0)
-    hole = replace(hole, dwell=last) if last > 0.0 else hole
-    first, apart = hole.top - depth_of(given, "FDEP", "FDPR"), _APART / making.unit
-    yield from pecked(
-        hole,
-        Pecks(
-            max(first, _SHORT),
-            back=given.get("VRT", 0.0) or apart,
-            ahead=(given.get("DIS1", 0.0) or apart,) * 2,
-            less=less,
-            least=given.get("MDEP", 0.0) or less,
-            breaks=0 if given.get("VARI", 0.0) else math.inf,
-            above=given.get("DTS", 0.0),
-            below=max(given.get("DTB", 0.0), 0.0),
-        ),
+    pecks = Pecks(
+        max(hole.top - depth_of(given, "FDEP", "FDPR"), _SHORT),
+        back=given.get("VRT", 0.0) or apart,
+        ahead=(given.get("DIS1", 0.0) or apart,) * 2,
+        less=less,
+        least=given.get("MDEP", 0.0) or less,
+        breaks=0 if given.get("VARI", 0.0) else math.inf,
+        above=given.get("DTS", 0.0),
+        below=max(given.get("DTB", 0.0), 0.0),
     )
-    yield go(hole.retract)
+    return pecked(replace(hole, dwell=last) if last > 0.0 else hole, pecks)
 
 
-_CYCLES: dict[str, Cycle] = {
-    "CYCLE81": _straight("CYCLE81"),
-    "CYCLE82": _straight("CYCLE82"),
+def _drilling(name: str, rows: Callable[[Making, Given, HolePlan], Iterator[Row]]) -> Cycle:
+    """The cycle of a hole: its rows, then up to the retract plane."""
+
+    def cycle(making: Making, given: Given) -> Iterator[Row]:
+        hole = hole_of(name, given)
+        yield from rows(making, given, hole)
+        yield go(hole.retract)
+
+    return cycle
+
+
+_HOLES: dict[str, Callable[[Making, Given, HolePlan], Iterator[Row]]] = {
+    **dict.fromkeys(("CYCLE81", "CYCLE82"), _drilled),
     "CYCLE83": _deep,
-    "CYCLE84": _rigid,
-    "CYCLE840": _chuck,
+    "CYCLE84": partial(_tapped, rigid=True),
+    "CYCLE840": partial(_tapped, rigid=False),
     "CYCLE85": _reamed,
-    "CYCLE86": _bored,
-    "CYCLE87": _straight("CYCLE87", *_HALT),
-    "CYCLE88": _straight("CYCLE88", *_HALT),
-    "CYCLE89": _straight("CYCLE89", out=True),
-    **{name: pocket(name) for name in POCKETS},
-    **{name: slots(name) for name in RADIAL},
+    **dict.fromkeys(("CYCLE87", "CYCLE88"), partial(_drilled, halts=True)),
+    "CYCLE89": partial(_drilled, back=True),
+}
+_CYCLES: dict[str, Cycle] = {
+    **{name: _drilling(name, rows) for name, rows in _HOLES.items()},
+    "CYCLE86": lambda making, given: _bored(making, given, hole_of("CYCLE86", given)),
+    **{name: partial(pocket, name=name) for name in POCKETS},
+    **{name: partial(slots, name=name) for name in RADIAL},
 }
 
 
-def _keeping_modes(name: str, cycle: Cycle) -> Maker:
-    def rows(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-        if making.interpreter.state.normal != 2:
-            raise ValueError(f"{name} in G18 or G19 is not read; write G17 before it")
-        return around(making, cycle(making, _in_seconds(making, given)), feed=False)
-
-    return rows
-
-
-MAKERS = {name: _keeping_modes(name, cycle) for name, cycle in _CYCLES.items()}
+def cycle_rows(making: Making, given: Given, *, name: str) -> Iterator[Row]:
+    """The rows of a cycle in G17, with G90 and the feed as before. Raises ValueError."""
+    if making.interpreter.state.normal != 2:
+        raise ValueError(f"{name} in G18 or G19 is not read; write G17 before it")
+    return around(making, _CYCLES[name](making, _in_seconds(making, given)), feed=False)

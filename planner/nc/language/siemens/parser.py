@@ -9,14 +9,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.nc.language.makers import with_makers
+from planner.nc.language.makers import corner
 from planner.nc.language.run import Dialect
 from planner.nc.language.siemens import commands, patterns, tables
 from planner.nc.language.siemens.block_words import COMMANDS, EACH_LINE, BlockWords
 from planner.nc.language.siemens.text import LANGUAGE, LineTokens, variable
 from planner.nc.language.source import SourceLine
 from planner.nc.language.system_variables import PositionVariables
-from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign, made
+from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _TARGETS = re.compile(rb"(?:GOTO[BFC]?|REPEATB?)\s+N(\d{1,9})\b", re.IGNORECASE)
@@ -66,7 +66,7 @@ class SiemensParser(BlockWords):
             moves = np.isin(self.source.words.of_rows(row)[0], (ord("X"), ord("Y"))).any()
             (plain,) = self.source.plain(row, row + 1)
             if moves and self.rounding is not None:
-                self.body.append(made(plain.place, "corner", kind=0.0, size=self.rounding, modal=ONE))
+                self.body.append(corner(plain.place, "RND", self.rounding, modal=True))
             self.body.append(plain)
             if moves and self.cycle is not None:
                 self.body += self.cycle
@@ -153,6 +153,4 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], object]] = {
 }
 
 
-DIALECT = Dialect(
-    LANGUAGE, PositionVariables, SiemensParser, commands.siemens_files, with_makers, tables.UNKNOWN
-)
+DIALECT = Dialect(LANGUAGE, PositionVariables, SiemensParser, commands.siemens_files, tables.UNKNOWN)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from planner.nc.arcs import IN_PLANE
 from planner.nc.language import tree
+from planner.nc.language.makers import dwell_turns
 from planner.nc.language.siemens.commands import Commands
 from planner.nc.language.siemens.text import LineTokens, position
 
@@ -28,6 +29,7 @@ class Row:
     through: dict[str, tree.Expression] = field(default_factory=dict)  # I1 J1 K1 of CIP
     polar: list[tuple[tree.Parameter, tree.Expression]] = field(default_factory=list)  # AP and RP
     stops: bool = False  # it ends in a full stop
+    corner: bool = False  # it ends in a rounding or chamfer
 
     def has(self, letters: str) -> bool:
         """True if there is a word with one of the letters."""
@@ -110,7 +112,7 @@ class Places(Commands):
         if "F" in given:
             row.before.append(tree.row(reader.place, ("G", 4.0), ("P", given["F"])))
         elif "S" in given:
-            row.before.append(tree.made(reader.place, "dwell turns", turns=given["S"]))
+            row.before.append(tree.made(reader.place, dwell_turns, turns=given["S"]))
         else:
             raise reader.fault("G4 is followed by F and seconds, or S and turns of the spindle", 0)
 

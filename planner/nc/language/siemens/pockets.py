@@ -2,10 +2,10 @@
 
 import cmath
 import math
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
 
-from planner.nc.language.making import Cycle, HolePlan, Making, Row
+from planner.nc.language.making import HolePlan, Making, Row
 from planner.nc.language.milling import (
     HELIX,
     RAPID,
@@ -18,6 +18,7 @@ from planner.nc.language.milling import (
 )
 
 _OVERLAP = 0.8  # of the tool's diameter between two paths, where MIDA is 0
+_SAID = "{0}: passes and allowances are those of the cycle, the single paths this reader's own"
 
 
 def required(name: str, given: Container[str], *keys: str) -> None:
@@ -47,64 +48,49 @@ def hole_of(name: str, given: Mapping[str, float]) -> HolePlan:
     return HolePlan(clear, top, bottom, given["RTP"], None, given.get("DTB", 0.0))
 
 
-def slots(name: str) -> Cycle:
+def slots(making: Making, given: Mapping[str, float], *, name: str) -> Iterator[Row]:
     """SLOT1, SLOT2 and LONGHOLE: pockets, each turned about the circle's middle."""
-
-    def rows(making: Making, given: Mapping[str, float]) -> Iterator[Row]:
-        needed = ("AFSL", "WID") if name == "SLOT2" else ("LENG", "WID")[: 1 + (name == "SLOT1")]
-        required(name, given, "NUM", "CPA", "CPO", "RAD", "FFP1", *needed)
-        hole, radius, size = hole_of(name, given), making.tool_radius(), given["RAD"]
-        half = given["WID"] / 2.0 if "WID" in needed else radius
-        making.assume(
-            f"{name}: passes and allowances are those of the cycle, the single paths this reader's own"
-        )
-        if name != "SLOT2":
-            making.assume(f"{name}: LENG is the whole length of the slot, which begins at RAD")
-        plan = replace(
-            _cutting(
-                making,
-                name,
-                dict(given) | {"VARI": given.get("VARI", 0.0) % 10 + 1.0, "CDIR": given.get("CDIR", 2.0)},
-                radius,
-            ),
-            depth=replace(hole, feed=0.0, what="slot"),
-            side=given.get("FAL", 0.0),
-            finish_infeed=given.get("MIDF", 0.0),
-            finish_feed=given.get("FFP2", 0.0) or given["FFP1"],
-        )
-        if not given.get("VARI", 0.0) and plan.side:
-            plan = replace(plan, walls=True)
-        count = round(given["NUM"])
-        step = given.get("INDA", 0.0) or 360.0 / count
-        shape: PocketShape = ArcSlot(size, half, 0.0, math.radians(given.get("AFSL", 0.0)))
-        centre = complex(given["CPA"], given["CPO"])
-        if name != "SLOT2":
-            shape = RoundedRectangle(given["LENG"] / 2.0, half, half)
-        for k in range(count):
-            angle = given.get("STA1", 0.0) + k * step
-            middle = cmath.rect(size + given["LENG"] / 2.0, math.radians(angle)) if name != "SLOT2" else 0.0
-            yield from pocket_rows(shape, plan, centre + middle, angle)
-
-    return rows
+    needed = {"SLOT1": ("LENG", "WID"), "SLOT2": ("AFSL", "WID"), "LONGHOLE": ("LENG",)}[name]
+    required(name, given, "NUM", "CPA", "CPO", "RAD", "FFP1", *needed)
+    hole, radius, size = hole_of(name, given), making.tool_radius(), given["RAD"]
+    half = given["WID"] / 2.0 if "WID" in needed else radius
+    making.assume(_SAID.format(name))
+    if name != "SLOT2":
+        making.assume(f"{name}: LENG is the whole length of the slot, which begins at RAD")
+    kind, turn = given.get("VARI", 0.0), given.get("CDIR", 2.0)
+    plan = replace(
+        _cutting(making, name, {**given, "VARI": kind % 10 + 1.0, "CDIR": turn}, radius),
+        depth=replace(hole, what="slot"),
+        finish_infeed=given.get("MIDF", 0.0),
+        finish_feed=given.get("FFP2", 0.0) or given["FFP1"],
+    )
+    if not kind and plan.side:
+        plan = replace(plan, walls=True)
+    count = round(given["NUM"])
+    step = given.get("INDA", 0.0) or 360.0 / count
+    shape: PocketShape = ArcSlot(size, half, 0.0, math.radians(given.get("AFSL", 0.0)))
+    if name != "SLOT2":
+        shape = RoundedRectangle(given["LENG"] / 2.0, half, half)
+    for k in range(count):
+        angle = given.get("STA1", 0.0) + k * step
+        middle = cmath.rect(size + given["LENG"] / 2.0, math.radians(angle)) if name != "SLOT2" else 0.0
+        yield from pocket_rows(shape, plan, complex(given["CPA"], given["CPO"]) + middle, angle)
 
 
-def pocket(name: str) -> Cycle:
-    """The maker of POCKET3 or POCKET4."""
-
-    def rows(making: Making, given: Mapping[str, float]) -> Iterable[Row]:
-        required(name, given, "RTP", "RFP", "SDIS", "DP", "PA", "PO", "FFP1", "CDIR", "VARI")
-        for key in ("AP1", "AP2", "AD"):
-            if given.get(key):
-                text = f"{key} of {name}, a pocket that is there already, is not read; leave it out"
-                raise ValueError(text)
-        radius = making.tool_radius()
-        plan = _plan(making, name, given, radius)
-        text = f"{name}: passes and allowances are those of the cycle, the single paths this reader's own"
-        making.assume(text)
-        place = complex(given["PA"], given["PO"])
-        return pocket_rows(_shape(name, given, radius), plan, place, given.get("STA", 0.0))
-
-    return rows
+def pocket(making: Making, given: Mapping[str, float], *, name: str) -> Iterator[Row]:
+    """POCKET3 and POCKET4. Raises ValueError."""
+    required(name, given, "RTP", "RFP", "SDIS", "DP", "PA", "PO", "FFP1", "CDIR", "VARI")
+    for key in ("AP1", "AP2", "AD"):
+        if given.get(key):
+            text = f"{key} of {name}, a pocket that is there already, is not read; leave it out"
+            raise ValueError(text)
+    radius = making.tool_radius()
+    plan = _cutting(making, name, given, radius)
+    making.assume(_SAID.format(name))
+    shape = _shape(name, given, radius)
+    if plan.plunge == HELIX and plan.helix[0] > shape.room - radius - plan.side:
+        raise ValueError(f"the helix of RAD1 {plan.helix[0]:g} has no room beside the tool in {name}")
+    return pocket_rows(shape, plan, complex(given["PA"], given["PO"]), given.get("STA", 0.0))
 
 
 def _shape(name: str, given: Mapping[str, float], radius: float) -> PocketShape:
@@ -137,9 +123,8 @@ def _cutting(making: Making, name: str, given: Mapping[str, float], radius: floa
         raise ValueError(f"CDIR {given['CDIR']:g} of {name} is none of 0, 1, 2 and 3")
     if given["CDIR"] in (0.0, 1.0) and making.interpreter.state.spindle.turning < 0:
         turn = -turn  # climb milling with M4
-    side = given.get("FAL", 0.0)
     return PocketPlan(
-        depth=replace(hole_of(name, given), feed=0.0, what="pocket"),
+        depth=replace(hole_of(name, given), what="pocket"),
         radius=radius,
         infeed=given.get("MID", 0.0),
         step=given.get("MIDA", 0.0) or _OVERLAP * 2.0 * radius,
@@ -147,7 +132,7 @@ def _cutting(making: Making, name: str, given: Mapping[str, float], radius: floa
         plunge_feed=given.get("FFD", 0.0),
         finish_feed=given["FFP1"],
         turning=turn,
-        side=side,
+        side=given.get("FAL", 0.0),
         floor=given.get("FALD", 0.0),
         rough=kind == 1,
         walls=kind == 2,
@@ -156,10 +141,3 @@ def _cutting(making: Making, name: str, given: Mapping[str, float], radius: floa
         plunge=(RAPID, STRAIGHT, HELIX)[plunge],
         helix=(given.get("RAD1", 0.0), given.get("DP1", 0.0)),
     )
-
-
-def _plan(making: Making, name: str, given: Mapping[str, float], radius: float) -> PocketPlan:
-    plan = _cutting(making, name, given, radius)
-    if plan.plunge == HELIX and plan.helix[0] > _shape(name, given, radius).room - radius - plan.side:
-        raise ValueError(f"the helix of RAD1 {plan.helix[0]:g} has no room beside the tool in {name}")
-    return plan

@@ -33,6 +33,11 @@ from planner.nc.settings import PRINTER_FEED, SET_RETRACTION
 
 _FLOW, _VOLUME = 221.0, 200.0  # M codes
 _PERCENT = 100.0
+# Words of these codes, from which value on they are read, and what is allowed.
+_FLOWS = (
+    (_FLOW, "S", np.nextafter(0.0, 1.0), "the flow is a percentage above 0, such as M221 S95"),
+    (_VOLUME, "D", 0.0, "the filament's diameter is above 0, such as M200 D1.75, or D0 where E is a length"),
+)
 _D, _E, _F, _G, _M, _S = (ord(letter) for letter in "DEFGMS")
 _KEYS = {
     "M207": {"s": "length", "f": "speed", "r": "extra", "t": "speed_forward"},  # R and T are RepRapFirmware's
@@ -83,8 +88,8 @@ def with_extruder(
     retractions: Sequence[Retraction] = (),
 ) -> Program:
     """The program with what the extruder feeds on each block, and full stops where it moves alone. Raises
-    InputError for an E word beside more than one move or beside another G code, and for one alone before the
-    first F word.
+    InputError for an E word beside more than one move or beside another G code, for one alone before the
+    first F word, and for a flow or diameter that makes no sense.
 
     row     : (B,) that each block comes from
     words   : of the program; of these the first `rows` rows
@@ -92,6 +97,7 @@ def with_extruder(
     states  : row, name, and whether it is brought back, of the states that are kept (saved_states.py)
     retractions : how G10 and G11 feed from a row on
     """
+    _check_flows(words, rows, program.source)
     state = np.zeros(rows, dtype=np.int64)
     names = list(dict.fromkeys(name for _, name, _ in states))
     for of, name, back in states:
@@ -116,6 +122,18 @@ def with_extruder(
     extruded[of_moves[first[~alone]]] = fed.amount[given[~alone]]
     at = np.searchsorted(row, given[alone], side="right")
     return _with_stops(program, extruded, at, line[alone], _Fed(*(c[given[alone]] for c in fed)))
+
+
+def _check_flows(words: Words, rows: int, source: str) -> None:
+    """Raise InputError for a flow that is not positive, and a diameter below 0."""
+    for code, letter, least, allowed in _FLOWS:
+        for row in words.rows_with(words.find("M", code)):
+            letters, values = words.of_rows(row)
+            wrong = np.flatnonzero((letters == ord(letter)) & (values < least)) + words.first[row]
+            if len(wrong) and row < rows:
+                found = f"M{code:g} {words.text(int(wrong[0]))}"
+                place = int(words.line[row]), words.column(int(wrong[0]))
+                raise InputError(f"{found}: {allowed}", source=source, line=place[0], column=place[1])
 
 
 def _retract(fed: _Fed, words: Words, rows: int, retractions: Sequence[Retraction]) -> None:

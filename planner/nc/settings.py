@@ -124,7 +124,7 @@ MAY_MOVE = frozenset((96, 97, 198, 290, 401, 402))  # jumps, and codes of printe
 # G codes in tenths that set or cancel something, where no axis word stands beside them: polar coordinates
 # off, polar interpolation off, stored stroke and spindle speed checks, mirror image off, slower corners,
 # tapping, output, look-ahead of Haas and its smoothness, rotation off.
-_G_SETTINGS = frozenset((131, 150, 220, 230, 250, 260, 501, 620, 630, 690, 1020, 1030, 1130, 1870))
+G_SETTINGS = frozenset((131, 150, 220, 230, 250, 260, 501, 620, 630, 690, 1020, 1030, 1130, 1870))
 # Codes of the groups that are settings beside some words.
 _SOMETIMES = frozenset((50, 51, 80, 100, 920))
 ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {730}}
@@ -166,7 +166,7 @@ def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
         return CodeSetting(SPINDLE_LIMIT, "SPQR")
     if code == 1870 and "E" in behind:
         return CodeSetting(None, "EP")
-    if code == 500 or (code in _G_SETTINGS and not (code == 150 and "H" in behind)):
+    if code == 500 or (code in G_SETTINGS and not (code == 150 and "H" in behind)):
         return CodeSetting(G_SETTING, "DEHLPQRS")
     if code in (100, 110) and "L" not in behind:
         return CodeSetting(RETRACTION, "PRS")

@@ -108,6 +108,9 @@ def test_words_of_codes_are_not_the_extruders() -> None:
         ("G21\nM83\nG1 E1\nG1 X1 F100\n", 3, "before the first F word"),
         ("G21 F600\nM83\nG4 P1 E1\nG1 X1\n", 3, "none of G0 to G3"),
         ("G21 F600\nM83\nG28 X1 E1\n", 3, "none of G0 to G3"),
+        ("G21 F600\nM83\nM221 S-5\nG1 X10 E1\n", 3, "M221 S-5: the flow is a percentage above 0"),
+        ("G21 F600\nM83\nM221 S0\nG1 X10 E1\n", 3, "M221 S0: the flow is a percentage above 0"),
+        ("G21 F600\nM83\nM200 D-1\nG1 X10 E1\n", 3, "M200 D-1: the filament's diameter is above 0"),
     ],
 )
 def test_what_the_extruder_cannot_do_is_refused(text: str, line: int, what: str) -> None:

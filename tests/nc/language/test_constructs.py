@@ -17,6 +17,11 @@ HEADS = {
         "heidenhain",
         "0 BEGIN PGM T MM\nL X+0 Y+0 Z+5 FMAX M3\n{0}\nL X+20 Y+3 F100\nEND PGM T MM\n",
     ),
+    "Fanuc and Haas": ("fanuc", "O1000\nG21 G90 G17 F600\nS1000 M3\nG0 X1 Y2 Z3\n{0} X1\nG1 X20 Y8\nM30\n"),
+    "Lathes of Fanuc and Haas": (
+        "fanuc",
+        "O1000\nG21 G99 F0.2\nG97 S1000 M3\nG0 X1 Z3\n{0}\nG1 X20 W-8\nM30\n",
+    ),
 }
 
 # Refused only with compensation or rotary axes, which these programs have not.

@@ -23,8 +23,8 @@ _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 DRILLS = {f"G{n}": float(n) for n in (81, 82, 83, 84, 85, 86, 89)} | {"G184": 74.0}
 _TURNING = {"G84": 3.0, "G184": 4.0}  # the spindle, which these cycles start themselves
 # Codes that are not read, and what they are.
-_LIVE = "turns or drills with a driven tool, for which the spindle is an axis"
-_REFUSED = {
+_LIVE = "turns or drills with a driven tool, for which the spindle is an axis,"
+REFUSED = {
     **dict.fromkeys(("G12.1", "G112", "G7.1", "G107"), "milling in x and the spindle's angle, which is no axis here,"),
     **dict.fromkeys(("G87", "G88"), "a cycle that drills from the side (Fanuc), or ends in a retract by hand (Haas),"),
     **dict.fromkeys(("G95", "G186", "G195", "G196", *(f"G{n}" for n in range(241, 250))), f"a cycle that {_LIVE}"),
@@ -75,9 +75,9 @@ class LatheWords(FanucParser):
 
     def _words(self, words: tree.Words, assignments: tree.Assignments, line: SourceLine) -> None:
         codes = {word.code for word in words}
-        for code in sorted(codes & set(_REFUSED)):
+        for code in sorted(codes & set(REFUSED)):
             raise line.fault(
-                f"{code}, {_REFUSED[code]} is not read; write the moves out in X and Z, or leave this part out"
+                f"{code}, {REFUSED[code]} is not read; write the moves out in X and Z, or leave this part out"
             )
         given = {word.letter: word.value for word in words if word.letter not in "GM"}
         self.feed = given.get("F", self.feed)

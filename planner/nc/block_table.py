@@ -29,12 +29,6 @@ class BlockColumns(NamedTuple):
     tolerance: FloatArray
     frame: Array  # int32
 
-    @classmethod
-    def empty(cls, axes: int) -> BlockColumns:
-        """No blocks yet, with so many axes."""
-        kind, feed, line = np.empty(0, dtype=np.uint8), np.empty(0), np.empty(0, dtype=np.int32)
-        return cls(kind, np.empty((0, axes)), feed, line, kind, feed, line)
-
 
 class EventColumns(NamedTuple):
     """The events of a program, fields of `EventTable`, with room to spare."""
@@ -43,12 +37,6 @@ class EventColumns(NamedTuple):
     line: Array  # int32
     letter: Array  # uint8
     value: FloatArray
-
-    @classmethod
-    def empty(cls) -> EventColumns:
-        """No events yet."""
-        int64, int32, uint8 = (np.empty(0, dtype=dtype) for dtype in (np.int64, np.int32, np.uint8))
-        return cls(int64, int32, uint8, np.empty(0))
 
 
 class BlockTable:
@@ -61,9 +49,11 @@ class BlockTable:
         self.events = 0
         self.refusals = 0
         self.frame = 0
-        self.block = BlockColumns.empty(axes)
-        self.event = EventColumns.empty()
-        self.refused_word = np.empty(0, dtype=np.int64)  # found by the compiled loop
+        uint8, int32, int64 = (np.empty(0, dtype=dtype) for dtype in (np.uint8, np.int32, np.int64))
+        real = np.empty(0)
+        self.block = BlockColumns(uint8, np.empty((0, axes)), real, int32, uint8, real, int32)
+        self.event = EventColumns(int64, int32, uint8, real)
+        self.refused_word = int64  # found by the compiled loop
         self.dwells: list[tuple[int, float]] = []
         self.splines: list[tuple[int, FloatArray, FloatArray]] = []
         self.arcs: list[tuple[int, FloatArray, int, float]] = []

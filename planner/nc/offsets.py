@@ -29,6 +29,7 @@ _OF_HAAS, _G154 = 1100, 1540  # G110, the first of G110 to G129, which are G154 
 _DATA = (3, 50, 52)  # tool life, parameters of the control; to G11
 NO_G54 = "G54 has no offset"
 _FANUC_TOOLS = (10, 11, 12, 13)
+_FANUC_SYSTEMS = 6  # G54 to G59
 _FIXTURE = 593  # the system of G10 L11
 
 
@@ -139,45 +140,30 @@ def set_data(state: State, block: Block, findings: Findings) -> None:
         raise block.fault(needed, "L" if kind >= 0 else "one-shot")
 
 
-def _refuse_words(block: Block, kind: int, letters: str) -> None:
-    for letter in letters:
+def _set_system(state: State, block: Block, kind: int) -> None:
+    """G10 L2 and L20 P1 to P9, P0 for the system in force; of Fanuc L2 P1 to P6, and L20 P1 to P300 for G54.1."""
+    number = integer(block, "P", 0) if "P" in block.value else -1
+    last = len(SYSTEMS) if not state.fanuc else FURTHER_MAX if kind == 20 else _FANUC_SYSTEMS
+    if not (1 if state.fanuc else 0) <= number <= last:
+        needed = f"G10 L{kind} needs its work system as P0 (the one in force) or P1 to P{last}"
+        if state.fanuc:
+            external = "; P0, the external offset, is not read" if number == 0 else ""
+            needed = f"G10 L{kind} of Fanuc needs its work system as P1 to P{last}{external}"
+        raise block.fault(needed, "P" if number >= 0 else "one-shot")
+    further = state.fanuc and kind == 20
+    code = FURTHER_SYSTEMS + number if further else SYSTEMS[number - 1] if number else state.system
+    system = state.work_system(code)
+    for letter in "IJQ" if kind == 2 and not state.fanuc else "IJQR":
         if letter in block.value:
             raise block.fault(f"G10 L{kind} does not use {letter}; remove it", letter)
-
-
-def _set_system(state: State, block: Block, kind: int) -> None:
-    if state.fanuc:
-        _set_fanuc_system(state, block, kind)
-        return
-    number = integer(block, "P", 0) if "P" in block.value else -1
-    if not 0 <= number <= len(SYSTEMS):
-        needed = f"G10 L{kind} needs its work system as P0 (the one in force) or P1 to P9"
-        raise block.fault(needed, "P" if number >= 0 else "one-shot")
-    code = SYSTEMS[number - 1] if number else state.system
-    system = state.work_system(code)
-    _refuse_words(block, kind, "IJQ" if kind == 2 else "IJQR")
-    if kind == 2:
+    if state.fanuc and not state.absolute:
+        raise block.fault(f"G10 L{kind} of Fanuc adds after G91; write G90 before it", "one-shot")
+    if kind == 2 or state.fanuc:
         system = System(_given(state, block, system.origin), block.value.get("R", system.rotation))
     else:
         wanted = _given(state, block, state.in_system(code) - state.g92) + state.g92
         system = replace(system, origin=state.position - state.tool_offset - system.turn(wanted))
     state.systems[code] = system
-
-
-def _set_fanuc_system(state: State, block: Block, kind: int) -> None:
-    """G10 L2 P1 to P6, and G10 L20 P1 to P300 for G54.1."""
-    number = integer(block, "P", 0) if "P" in block.value else -1
-    number_max = FURTHER_MAX if kind == 20 else 6
-    if not 1 <= number <= number_max:
-        external = "; P0, the external offset, is not read" if number == 0 else ""
-        needed = f"G10 L{kind} of Fanuc needs its work system as P1 to P{number_max}{external}"
-        raise block.fault(needed, "P" if number >= 0 else "one-shot")
-    _refuse_words(block, kind, "IJQR")
-    if not state.absolute:
-        raise block.fault(f"G10 L{kind} of Fanuc adds after G91; write G90 before it", "one-shot")
-    code = FURTHER_SYSTEMS + number if kind == 20 else SYSTEMS[number - 1]
-    system = state.work_system(code)
-    state.systems[code] = replace(system, origin=_given(state, block, system.origin))
 
 
 def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None:

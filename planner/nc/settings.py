@@ -79,20 +79,13 @@ G_SETTING = Assumption(
     "assumed not to move anything",
     changes=True,
 )
+_STOPS = "a full stop; what it moves is not planned, and the head is assumed to come back"
 PARKS = Assumption(
-    "code{|s} that change{s|} or load{s|} filament, or park{s|} the head",
-    "a full stop; what it moves is not planned, and the head is assumed to come back",
-    changes=True,
+    "code{|s} that change{s|} or load{s|} filament, or park{s|} the head", _STOPS, changes=True
 )
-MACRO = Assumption(
-    "macro{|s} of the printer",
-    "a full stop; what it moves is not planned, and the head is assumed to come back",
-    changes=True,
-)
+MACRO = Assumption("macro{|s} of the printer", _STOPS, changes=True)
 LEVELLING = Assumption(
-    "code{|s} of a 3-D printer that level{s|}, wipe{s|} or probe{s|}",
-    "a full stop; what it moves is not planned, and the head is assumed to come back",
-    changes=True,
+    "code{|s} of a 3-D printer that level{s|}, wipe{s|} or probe{s|}", _STOPS, changes=True
 )
 TOOLS = Assumption(
     "change{|s} of the extruder (T)", "a full stop; what it moves and lasts is not planned", changes=True

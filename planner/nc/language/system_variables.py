@@ -12,6 +12,7 @@ import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
+from planner.nc.language import tree
 from planner.nc.language.travel import Travel
 from planner.nc.language.travel_rows import FrameParts
 from planner.nc.program import PathControl
@@ -32,6 +33,12 @@ _AXES = 9  # x y z a b c u v w; the last six are zero here
 # Parameters of the tree that hold the position, behind those that programs of Heidenhain and Siemens can
 # name: x, y, z.
 FIRST_POSITION = 2001
+POSITIONS = "XYZABC"
+
+
+def position(axis: str) -> tree.Numbered:
+    """Where an axis is, in the program's coordinates, for languages whose parameters are `PositionVariables`."""
+    return tree.numbered(FIRST_POSITION + POSITIONS.index(axis))
 
 
 def _numbers(*ranges: tuple[int, int]) -> frozenset[int]:
@@ -206,14 +213,14 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
 class PositionVariables(SystemVariables):
     """Positions of the axes alone, for languages whose parameters do not hold the state of the control."""
 
-    numbers = frozenset(range(FIRST_POSITION, FIRST_POSITION + 6))
+    numbers = frozenset(range(FIRST_POSITION, FIRST_POSITION + len(POSITIONS)))
 
     def get(self, parameter: int | str, depth: int) -> float:
-        axis = int(parameter) - FIRST_POSITION
-        if axis >= 3:
-            state, letter = self.interpreter.state, "ABC"[axis - 3]
-            return float(state.programmed()[state.letters.index(letter)]) if letter in state.letters else 0.0
-        return self.here(axis)
+        axis, state = int(parameter) - FIRST_POSITION, self.interpreter.state
+        if axis < 3:
+            return self.here(axis)
+        letter = POSITIONS[axis]
+        return float(state.programmed()[state.letters.index(letter)]) if letter in state.letters else 0.0
 
 
 class LinuxcncVariables(SystemVariables):

@@ -10,19 +10,9 @@ from collections.abc import Mapping
 from planner.base.units import MM_PER_INCH
 from planner.nc.codes import M_GROUP
 from planner.nc.language import tree
-from planner.nc.language.heidenhain import cycles, moves, tables
+from planner.nc.language.heidenhain import cycles, moves, tables, text
 from planner.nc.language.heidenhain.flow import NAMED, Flow
 from planner.nc.language.heidenhain.moves import Moves
-from planner.nc.language.heidenhain.text import (
-    POSITION,
-    Block,
-    Items,
-    Rows,
-    items,
-    looked_up,
-    parameter,
-    variable,
-)
 from planner.nc.language.making import Making, assumed_row
 from planner.nc.language.source import Source
 from planner.nc.language.tree import ZERO, Line, Return, row, word
@@ -47,7 +37,7 @@ _FEED_OUT, _FEED_MAX = 208, 99999.0
 REMEDY = "let the CAM system write the moves out as L, C and CC"
 
 
-def _named(block: Block, names: str, start: int, end: int) -> dict[str, tree.Expression]:
+def _named(block: text.Block, names: str, start: int, end: int) -> dict[str, tree.Expression]:
     """The values behind names, in a part of a block. Raises ProgramFault for a name that comes twice."""
     found: dict[str, tree.Expression] = {}
     block.column = start
@@ -96,19 +86,19 @@ class Definitions(Flow):
         self.oversizes = False  # a tool call of the program has DR
         self.tool_names: dict[str, int] = {}  # numbers of tools that have names
 
-    def _begin(self, block: Block) -> Rows:
+    def _begin(self, block: text.Block) -> text.Rows:
         inch = block.text.upper().split()[-1] == "INCH"
         self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
         codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
-        rows: Rows = [tree.row(block.place, *(("G", code) for code in codes))]
-        return [*rows, looked_up(block)] if self.file else rows
+        rows: text.Rows = [tree.row(block.place, *(("G", code) for code in codes))]
+        return [*rows, text.looked_up(block)] if self.file else rows
 
-    def _end(self, block: Block) -> Rows:
+    def _end(self, block: text.Block) -> text.Rows:
         if self.file:
             return [tree.Return(block.place)]
         return [tree.row(block.place, ("M", 30.0))]
 
-    def _tool(self, block: Block) -> Rows:
+    def _tool(self, block: text.Block) -> text.Rows:
         match = block.take(_TOOL_CALL)
         if match is None:
             raise block.wrong('TOOL CALL takes a number or "name", the axis Z, S, F, DL and DR')
@@ -121,7 +111,7 @@ class Definitions(Flow):
             raise block.fault("DR2, of a tool's corner radius, is not read; write 0", match.start(6))
         if more_of and tool is None:
             raise block.fault("DL and DR need the number of the tool in their TOOL CALL", match.start(6))
-        rows: Rows = []
+        rows: text.Rows = []
         if tool is not None:
             number: tree.Expression = tree.Number(float(tool))
             if match.group(1) and not match.group(1).isdecimal():
@@ -142,7 +132,7 @@ class Definitions(Flow):
             self.moves.automatic = block.value()
             rows.append(tree.row(block.place, ("F", self.moves.scaled(self.moves.automatic))))
         if tool is not None:
-            rows.append(looked_up(block))
+            rows.append(text.looked_up(block))
         return rows
 
     def _tool_number(self, number: str | None, name: str | None) -> int | None:
@@ -151,7 +141,7 @@ class Definitions(Flow):
             return int(number) if number.isdecimal() else 0
         return None if name is None else self.tool_names.setdefault(name, NAMED + len(self.tool_names))
 
-    def _tool_data(self, block: Block) -> Rows:
+    def _tool_data(self, block: text.Block) -> text.Rows:
         """TOOL DEF: with L or R data from the next call on; without them the tool to have ready."""
         column, match = block.column, block.take(_TOOL_DEF)
         if match is None:
@@ -165,7 +155,7 @@ class Definitions(Flow):
         words = (({"L": "Z", "R": "R"}[name], given) for name, given in data.items())
         return [tree.row(block.place, ("G", 10.0), ("L", tree.ONE), ("P", float(tool)), *words)]
 
-    def _define(self, block: Block) -> Rows:
+    def _define(self, block: text.Block) -> text.Rows:
         match = block.take(r"\s*(\d+)(?:\.(\d+))?")
         if match is None:
             raise block.wrong("CYCL DEF needs the number of a cycle")
@@ -187,9 +177,9 @@ class Definitions(Flow):
         if cycle in cycles.PATTERNS:
             self._call_cycle(block)
             return [tree.assign(block.place, *given), tree.made(block.place, cycles.PATTERNS[cycle])]
-        return [tree.assign(block.place, *given, (variable("cycle"), tree.Number(float(cycle))))]
+        return [tree.assign(block.place, *given, (text.variable("cycle"), tree.Number(float(cycle))))]
 
-    def _feed_value(self, block: Block, q: int) -> tree.Expression:
+    def _feed_value(self, block: text.Block, q: int) -> tree.Expression:
         """A value of a cycle, a number or F AUTO, MAX, FMAX; Q208 0 is the rapid out."""
         if block.take(r"\s*F\s*AUTO\b"):
             if self.moves.automatic is None:
@@ -199,7 +189,7 @@ class Definitions(Flow):
             return tree.ZERO if q == _FEED_OUT else tree.Number(_FEED_MAX)
         return block.value()
 
-    def _old_cycle(self, block: Block, cycle: int, part: int) -> Rows:
+    def _old_cycle(self, block: text.Block, cycle: int, part: int) -> text.Rows:
         if cycle in (9, 12, 19, 32, *moves.TITLES) and part == 0:
             return []
         if cycle in tables.SAID_CYCLES:
@@ -223,24 +213,26 @@ class Definitions(Flow):
             return self._pecking(block, part)
         raise block.wrong(_not_read(cycle))
 
-    def _pecking(self, block: Block, part: int) -> Rows:
+    def _pecking(self, block: text.Block, part: int) -> text.Rows:
         """Cycle 1: its lines give parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
-            return [tree.assign(block.place, (variable("cycle"), tree.ONE))]
+            return [tree.assign(block.place, (text.variable("cycle"), tree.ONE))]
         column, match = block.column, block.take(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*")
         if match is None or not 1 <= part <= len(_OLD_PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
-        return [tree.assign(block.place, (parameter(_OLD_PECKING[part - 1]), block.value()))]
+        return [tree.assign(block.place, (text.parameter(_OLD_PECKING[part - 1]), block.value()))]
 
-    def _call_cycle(self, block: Block) -> Rows:
+    def _call_cycle(self, block: text.Block) -> text.Rows:
         if not self.cycles & cycles.CYCLES.keys():
             raise block.fault("there is no drilling or milling cycle to call; write CYCL DEF 200 before")
         return [tree.made(block.place, cycles.called)]
 
-    def _codes(self, block: Block, given: Items, *, straight: bool = False) -> tuple[Rows, Rows, bool]:
+    def _codes(
+        self, block: text.Block, given: text.Items, *, straight: bool = False
+    ) -> tuple[text.Rows, text.Rows, bool]:
         """Statements of M codes before and after the move, and whether it goes by machine coordinates."""
-        before: Rows = []
-        after: Rows = []
+        before: text.Rows = []
+        after: text.Rows = []
         machine = False
         for code, column in given.codes:
             at = block.byte(column)
@@ -268,7 +260,7 @@ class Definitions(Flow):
                 spindle = word("M", at, 3.0 if code == 13 else 4.0)
                 before.append(Line(block.place, (spindle, word("M", at, 8.0))))
             elif code in (*TOOL_POINT_ON, *TOOL_POINT_OFF) and self.source.at_tip:
-                before += [as_it_is, looked_up(block)]
+                before += [as_it_is, text.looked_up(block)]
             elif code in tables.REFUSED:
                 raise block.fault(f"M{code} is not read: {tables.REFUSED[code]}; {REMEDY}", column)
             elif code in tables.NOTHING:
@@ -284,24 +276,24 @@ class Definitions(Flow):
                 )
         return before, after, machine
 
-    def _retract(self, block: Block, given: Items) -> Rows:
+    def _retract(self, block: text.Block, given: text.Items) -> text.Rows:
         """M140: back along the tool's axis by MB, or to machine zero."""
         if given.back is None:
-            rows: Rows = [
+            rows: text.Rows = [
                 assumed_row(block.place, "retraction"),
                 tree.row(block.place, ("G", 53.0), ("G", ZERO), ("Z", ZERO)),
             ]
-            return [*rows, looked_up(block)]
-        way = {"Z": POSITION["Z"] + given.back}
+            return [*rows, text.looked_up(block)]
+        way = {"Z": text.POSITION["Z"] + given.back}
         fast = given.feed is None
-        return self.moves.straight(block, Items(feed=None if given.axes else given.feed, fast=fast), way)
+        return self.moves.straight(block, text.Items(feed=None if given.axes else given.feed, fast=fast), way)
 
-    def _call_program(self, block: Block) -> Rows:
+    def _call_program(self, block: text.Block) -> text.Rows:
         """CALL PGM. Raises ProgramFault without a name."""
         raise NotImplementedError
 
-    def _codes_alone(self, block: Block) -> tuple[Rows, Rows]:
-        column, given = block.column, items(block)
+    def _codes_alone(self, block: text.Block) -> tuple[text.Rows, text.Rows]:
+        column, given = block.column, text.items(block)
         # F of M128 is the largest feed of the axes that follow the tool: the joints' limits are for that
         own = (*TOOL_POINT_ON, 140)  # with a feed of their own
         feed = given.feed is not None and not any(code in own for code, _ in given.codes)
@@ -310,11 +302,11 @@ class Definitions(Flow):
         before, after, _ = self._codes(block, given)
         return before, after
 
-    def _code(self, block: Block) -> Rows:
+    def _code(self, block: text.Block) -> text.Rows:
         block.column = 0
         before, after = self._codes_alone(block)
         return [*before, *after]
 
-    def _stop(self, block: Block) -> Rows:
+    def _stop(self, block: text.Block) -> text.Rows:
         before, after = self._codes_alone(block)
         return [*before, row(block.place, ("M", ZERO)), *after]

@@ -57,7 +57,7 @@ class Moves:
 
     def scaled(self, feed: tree.Expression) -> tree.Expression:
         """A feed in mm or inch per minute."""
-        return feed if self.feed_scale == 1.0 else feed * tree.Number(self.feed_scale)
+        return feed if self.feed_scale == 1.0 else feed * self.feed_scale
 
     def straight(self, block: text.Block, given: text.Items, ends: Ends, machine: bool = False) -> text.Rows:
         """L and LP: a straight move to absolute coordinates."""
@@ -174,7 +174,7 @@ class Moves:
         radius, angle = text.POLAR
         turns = None
         if by is not None:
-            turns = tree.op("FUP", tree.op("ABS", by) / tree.Number(360.0) - tree.Number(1e-9))
+            turns = tree.op("FUP", tree.op("ABS", by) / 360 - 1e-9)
 
         def rows(normal: int) -> text.Rows | None:
             first, second = (text.POSITION[_AXES[a]] - text.POLE[a] for a in IN_PLANE[normal])
@@ -270,12 +270,8 @@ def transformed(block: text.Block, cycle: int) -> text.Rows:
             raise block.wrong("a mirror image takes the axes X, Y and Z, or none to end it")
         return frame_rows(block, dict.fromkeys(axes, tree.ZERO), cycle)
     if cycle == 26:
-        given: dict[str, tree.Expression] = {}
-        while block.rest.strip():
-            axis = block.take(r"\s*(CC[XYZ]|[XYZ])\s*(?=[-+.\dQ])")
-            if axis is None:
-                raise block.wrong("cycle 26 takes factors X Y Z and their centre CCX CCY CCZ")
-            given[axis[1].upper()] = block.value()
+        given = block.named(r"\s*(CC[XYZ]|[XYZ])\s*(?=[-+.\dQ])")
+        block.end("cycle 26 takes factors X Y Z and their centre CCX CCY CCZ")
         return frame_rows(block, given, cycle)
     column, word = block.column, block.take(r"\s*(I?ROT|SCL)\s*")
     if word is None or (word[1].upper() == "SCL") != (cycle == 11):
@@ -287,7 +283,7 @@ def transformed(block: text.Block, cycle: int) -> text.Rows:
 
 def plane_rows(block: text.Block) -> text.Rows:
     """PLANE SPATIAL, EULER, RELATIV and RESET. Raises ProgramFault."""
-    given = {name[1].upper(): block.value() for name in iter(lambda: block.take(_ANGLE), None)}
+    given = block.named(_ANGLE)
     needed = PLANES[block.function]
     if set(given) - set(needed) or (needed and not given):
         raise block.wrong(f"{block.function} takes {', '.join(needed) or 'no angles'}")
@@ -295,7 +291,7 @@ def plane_rows(block: text.Block) -> text.Rows:
     way = re.search(r"\b(STAY|TURN|MOVE)\b", rest)
     if way is None:
         raise block.wrong("TURN, MOVE or STAY says what the rotary axes do")
-    given |= {"way": tree.Number(float(swivel.WAYS[way[1]]))}
+    given |= {"way": tree.number(swivel.WAYS[way[1]])}
     if side := re.search(r"\bSEQ\s*([-+])", rest):
         given["side"] = tree.Number(1.0 if side[1] == "+" else -1.0)
     if "RELATIV" in block.function:
@@ -307,11 +303,8 @@ def plane_rows(block: text.Block) -> text.Rows:
 
 def working_plane(block: text.Block) -> text.Rows:
     """Cycle 19: A B C as spatial angles; the rotary axes stay."""
-    given = {
-        f"SP{name[1].upper()}": block.value()
-        for name in iter(lambda: block.take(r"\s*([ABC])\s*(?=[-+.\dQ])"), None)
-    }
-    return _tilted(block, {**given, "way": tree.Number(float(swivel.WAYS["STAY"]))})
+    given = {f"SP{axis}": angle for axis, angle in block.named(r"\s*([ABC])\s*(?=[-+.\dQ])").items()}
+    return _tilted(block, {**given, "way": tree.number(swivel.WAYS["STAY"])})
 
 
 def _tilted(block: text.Block, given: dict[str, tree.Expression]) -> text.Rows:

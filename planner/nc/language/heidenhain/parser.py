@@ -8,22 +8,14 @@ import re
 from collections.abc import Callable
 
 from planner.nc.language import tree
-from planner.nc.language.heidenhain import cycles, patterns, text
+from planner.nc.language.heidenhain import cycles, moves, patterns, text
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, files, procedure_name
-from planner.nc.language.heidenhain.moves import (
-    COMPENSATES,
-    PLANES,
-    TRANSFORMED,
-    approach_rows,
-    datum_rows,
-    plane_rows,
-)
 from planner.nc.language.makers import compensate, corner
 from planner.nc.language.making import assumed_row
 from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source
-from planner.nc.language.system_variables import PositionVariables
+from planner.nc.language.system_variables import PositionVariables, position
 
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
@@ -56,7 +48,7 @@ class HeidenhainParser(Definitions):
         """The main program under the empty name, and the subprograms that are called, under their labels."""
         self.blocks = tuple(text.blocks(self.source.words.data, self.source.file, self.source.begin))
         self._find_labels()
-        self.compensates = any(COMPENSATES.search(block.text) for block in self.blocks)
+        self.compensates = any(moves.COMPENSATES.search(block.text) for block in self.blocks)
         self.oversizes = any(re.match(r"TOOL CALL.*\bDR", b.text, re.IGNORECASE) for b in self.blocks)
         poles = [block.text.upper() for block in self.blocks if re.match(r"CC\b", block.text, re.IGNORECASE)]
         shared = bool(self.file) or any(re.match("CALL PGM", b.text, re.IGNORECASE) for b in self.blocks)
@@ -81,7 +73,7 @@ class HeidenhainParser(Definitions):
             (text.variable(f"rep{source.file}_{k}"), tree.ZERO) for k in range(self.repeats)
         ]
         if not source.file:
-            set_up += [(one, tree.ZERO) for one in (text.X, text.Y, text.Z, *text.POLE, *text.POLAR)]
+            set_up += [(one, tree.ZERO) for one in (*text.POSITION.values(), *text.POLE, *text.POLAR)]
             set_up += [(text.variable("cycle"), tree.ZERO), (text.PLANE, tree.number(2))]
         name = "file" if source.file else ""
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
@@ -150,7 +142,7 @@ class HeidenhainParser(Definitions):
             raise block.fault("polar coordinates belong to LP and CP")
         ends = {axis: text.absolute(axis, found) for axis, found in given.axes.items()}
         for axis in ends.keys() & set("ABC") if self.shortest else ():
-            here = text.position(axis)
+            here = position(axis)
             ends[axis] = here + tree.op("WRAPPED", ends[axis] - here)
         return ends
 
@@ -218,13 +210,13 @@ class HeidenhainParser(Definitions):
         return [tree.made(block.place, compensate, side=given.side)]
 
     def _approach(self, block: text.Block) -> text.Rows:
-        rows, given = approach_rows(block, self.moves)
+        rows, given = moves.approach_rows(block, self.moves)
         before, after, _ = self._codes(block, given)
         return [*before, *rows, *after]
 
     def _pole(self, block: text.Block) -> text.Rows:
         column, given = block.column, text.items(block)
-        ends = self._ends(block, given) if given.axes else {"X": text.X, "Y": text.Y}
+        ends = self._ends(block, given) if given.axes else {axis: text.POSITION[axis] for axis in "XY"}
         if len(ends) == 3 or (len(ends) == 1 and self.moves.tilted):
             why = "the plane of a pole is that of its two coordinates; write CC with both of them"
             raise block.fault(why, column)
@@ -281,14 +273,14 @@ _READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
     "END PGM": HeidenhainParser._end,
     **dict.fromkeys(("BLK FORM", "*", "FUNCTION MODE", "DECLARE STRING"), lambda parser, block: []),
     **dict.fromkeys(("FUNCTION TCPM", "FUNCTION RESET"), HeidenhainParser._tool_point),
-    **dict.fromkeys(PLANES, lambda parser, block: plane_rows(block)),
+    **dict.fromkeys(moves.PLANES, lambda parser, block: moves.plane_rows(block)),
     "PATTERN DEF": HeidenhainParser._pattern,
     "TOOL DEF": HeidenhainParser._tool_data,
     "TOOL CALL": HeidenhainParser._tool,
     **dict.fromkeys(("L", "LP"), HeidenhainParser._straight),
     **dict.fromkeys(("C", "CR", "CT", "CP", "CTP"), HeidenhainParser._arc),
     **dict.fromkeys(("APPR", "DEP"), HeidenhainParser._approach),
-    **dict.fromkeys(("TRANS DATUM", *TRANSFORMED), lambda parser, block: datum_rows(block)),
+    **dict.fromkeys(("TRANS DATUM", *moves.TRANSFORMED), lambda parser, block: moves.datum_rows(block)),
     "CC": HeidenhainParser._pole,
     "LBL": HeidenhainParser._label_here,
     "CALL LBL": HeidenhainParser._call,

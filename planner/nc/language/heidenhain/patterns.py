@@ -25,12 +25,9 @@ def places(block: Block) -> list[Place]:
         item = block.take(_ITEM)
         if item is None:
             raise block.wrong("POS1 ( ... ), ROW1, PAT1, FRAME1, CIRC1 or PITCHCIRC1 is expected here")
-        given: dict[str, tree.Expression] = {}
-        while not block.take(r"\s*\)"):
-            word = block.take(_WORD)
-            if word is None:
-                raise block.wrong("a value of the pattern is expected here, such as X+25")
-            given[word[1].upper()] = block.value()
+        given = block.named(_WORD)
+        if not block.take(r"\s*\)"):
+            raise block.wrong("a value of the pattern is expected here, such as X+25")
         found += _of(block, item[1].upper(), given)
     return found
 

@@ -16,7 +16,7 @@ from functools import cache
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
-from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
+from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables, position
 from planner.nc.language.tokens import Token, TokenReader, names, ranked
 from planner.nc.language.tree import Expression
 
@@ -57,12 +57,7 @@ def variable(name: str) -> tree.Named:
 
 def parameter(number: int, kind: str = "") -> tree.Numbered:
     """Q of that number; QL and QR with their letter."""
-    return tree.Numbered(tree.Number(float(number + _KINDS[kind])))
-
-
-def position(axis: str) -> tree.Numbered:
-    """Where an axis is, as the interpreter knows it."""
-    return tree.Numbered(tree.Number(float(FIRST_POSITION + "XYZABC".index(axis))))
+    return tree.numbered(number + _KINDS[kind])
 
 
 @dataclass
@@ -100,6 +95,13 @@ class Block:
         if match is not None:
             self.column = match.end()
         return match
+
+    def named(self, pattern: str) -> dict[str, tree.Expression]:
+        """The values behind names, the group of a pattern, as long as one comes. Raises ProgramFault."""
+        found: dict[str, tree.Expression] = {}
+        while name := self.take(pattern):
+            found[name[1].upper()] = self.value()
+        return found
 
     def end(self, message: str = "nothing may follow here") -> None:
         """Raises ProgramFault if more comes."""
@@ -205,8 +207,7 @@ class Formula(TokenReader):
         return tree.op(name, self.value()) if name in LANGUAGE.functions else None
 
 
-X, Y, Z = variable("x"), variable("y"), variable("z")
-POSITION = {"X": X, "Y": Y, "Z": Z}
+POSITION = {axis: variable(axis.lower()) for axis in "XYZ"}
 POLE = variable("cx"), variable("cy"), variable("cz")
 PLANE = variable("plane")  # the normal of the pole's plane, 0 to 2
 POLAR = variable("pr"), variable("pa")
@@ -280,5 +281,4 @@ def absolute(axis: str, given: tuple[Expression, bool]) -> Expression:
 
 def looked_up(block: Block) -> tree.Line:
     """Ask the interpreter for the position: behind offsets and moves in machine coordinates."""
-    where = [tree.Numbered(tree.Number(float(FIRST_POSITION + k))) for k in range(3)]
-    return tree.assign(block.place, *zip((X, Y, Z), where, strict=True))
+    return tree.assign(block.place, *((here, position(axis)) for axis, here in POSITION.items()))

@@ -11,7 +11,8 @@ from functools import partial
 from planner.nc.language import makers, swivel, tree
 from planner.nc.language.siemens import cycles, patterns, tables
 from planner.nc.language.siemens.declarations import Declarations, changed
-from planner.nc.language.siemens.text import LineTokens, handed_over, position
+from planner.nc.language.siemens.text import LineTokens, handed_over
+from planner.nc.language.system_variables import position
 
 _CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
 _TIMES = re.compile(r"P(\d+)")

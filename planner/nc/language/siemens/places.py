@@ -7,7 +7,8 @@ from planner.nc.arcs import IN_PLANE
 from planner.nc.language import tree
 from planner.nc.language.makers import dwell_turns
 from planner.nc.language.siemens.commands import Commands
-from planner.nc.language.siemens.text import LineTokens, position
+from planner.nc.language.siemens.text import LineTokens
+from planner.nc.language.system_variables import position
 
 AXES = "XYZ"
 

@@ -5,17 +5,8 @@ import math
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
 
+from planner.nc.language import milling
 from planner.nc.language.making import HolePlan, Making, Row
-from planner.nc.language.milling import (
-    HELIX,
-    RAPID,
-    STRAIGHT,
-    ArcSlot,
-    PocketPlan,
-    PocketShape,
-    RoundedRectangle,
-    pocket_rows,
-)
 
 _OVERLAP = 0.8  # of the tool's diameter between two paths, where MIDA is 0
 _SAID = "{0}: passes and allowances are those of the cycle, the single paths this reader's own"
@@ -68,13 +59,13 @@ def slots(making: Making, given: Mapping[str, float], *, name: str) -> Iterator[
         plan = replace(plan, walls=True)
     count = round(given["NUM"])
     step = given.get("INDA", 0.0) or 360.0 / count
-    shape: PocketShape = ArcSlot(size, half, 0.0, math.radians(given.get("AFSL", 0.0)))
+    shape: milling.PocketShape = milling.ArcSlot(size, half, 0.0, math.radians(given.get("AFSL", 0.0)))
     if name != "SLOT2":
-        shape = RoundedRectangle(given["LENG"] / 2.0, half, half)
+        shape = milling.RoundedRectangle(given["LENG"] / 2.0, half, half)
     for k in range(count):
         angle = given.get("STA1", 0.0) + k * step
         middle = cmath.rect(size + given["LENG"] / 2.0, math.radians(angle)) if name != "SLOT2" else 0.0
-        yield from pocket_rows(shape, plan, complex(given["CPA"], given["CPO"]) + middle, angle)
+        yield from milling.pocket_rows(shape, plan, complex(given["CPA"], given["CPO"]) + middle, angle)
 
 
 def pocket(making: Making, given: Mapping[str, float], *, name: str) -> Iterator[Row]:
@@ -88,18 +79,18 @@ def pocket(making: Making, given: Mapping[str, float], *, name: str) -> Iterator
     plan = _cutting(making, name, given, radius)
     making.assume(_SAID.format(name))
     shape = _shape(name, given, radius)
-    if plan.plunge == HELIX and plan.helix[0] > shape.room - radius - plan.side:
+    if plan.plunge == milling.HELIX and plan.helix[0] > shape.room - radius - plan.side:
         raise ValueError(f"the helix of RAD1 {plan.helix[0]:g} has no room beside the tool in {name}")
-    return pocket_rows(shape, plan, complex(given["PA"], given["PO"]), given.get("STA", 0.0))
+    return milling.pocket_rows(shape, plan, complex(given["PA"], given["PO"]), given.get("STA", 0.0))
 
 
-def _shape(name: str, given: Mapping[str, float], radius: float) -> PocketShape:
+def _shape(name: str, given: Mapping[str, float], radius: float) -> milling.PocketShape:
     if name == "POCKET4":
         required(name, given, "PRAD")
         size = given["PRAD"]
         if size <= 0.0:
             raise ValueError("PRAD, the radius of POCKET4, is to be above 0")
-        return RoundedRectangle(size, size, size)
+        return milling.RoundedRectangle(size, size, size)
     required(name, given, "LENG", "WID")
     corner = given.get("CRAD", 0.0) or radius
     if min(given["LENG"], given["WID"]) <= 0.0:
@@ -109,10 +100,10 @@ def _shape(name: str, given: Mapping[str, float], radius: float) -> PocketShape:
     a, b = given["LENG"] / 2.0, given["WID"] / 2.0
     if corner > min(a, b):
         raise ValueError(f"the corners of POCKET3 have a radius of {corner:g}: more than half its width")
-    return RoundedRectangle(a, b, corner)
+    return milling.RoundedRectangle(a, b, corner)
 
 
-def _cutting(making: Making, name: str, given: Mapping[str, float], radius: float) -> PocketPlan:
+def _cutting(making: Making, name: str, given: Mapping[str, float], radius: float) -> milling.PocketPlan:
     kind, plunge = round(given["VARI"]) % 10, round(given["VARI"]) // 10
     if kind not in (1, 2) or plunge not in (0, 1, 2):
         raise ValueError(f"VARI {given['VARI']:g} of {name} is not read; read are 1, 2, 11, 12, 21 and 22")
@@ -123,7 +114,7 @@ def _cutting(making: Making, name: str, given: Mapping[str, float], radius: floa
         raise ValueError(f"CDIR {given['CDIR']:g} of {name} is none of 0, 1, 2 and 3")
     if given["CDIR"] in (0.0, 1.0) and making.interpreter.state.spindle.turning < 0:
         turn = -turn  # climb milling with M4
-    return PocketPlan(
+    return milling.PocketPlan(
         depth=replace(hole_of(name, given), what="pocket"),
         radius=radius,
         infeed=given.get("MID", 0.0),
@@ -138,6 +129,6 @@ def _cutting(making: Making, name: str, given: Mapping[str, float], radius: floa
         walls=kind == 2,
         base=kind == 2 and given.get("FALD", 0.0) > 0.0,
         finish_infeed=given.get("MID", 0.0),
-        plunge=(RAPID, STRAIGHT, HELIX)[plunge],
+        plunge=(milling.RAPID, milling.STRAIGHT, milling.HELIX)[plunge],
         helix=(given.get("RAD1", 0.0), given.get("DP1", 0.0)),
     )

@@ -15,7 +15,7 @@ import re
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS, LOGICAL
 from planner.nc.language.source import LineParser, Source
-from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables
+from planner.nc.language.system_variables import FIRST_POSITION, POSITIONS, PositionVariables, position
 from planner.nc.language.tokens import Token, TokenReader, names, ranked
 
 PARAMETERS = 1000  # R0 to R999; parameter n of the tree is R(n-1)
@@ -56,11 +56,6 @@ _MORE = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX", "MINVAL": "MIN", "MAXVAL":
 _SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP|AA_IB)\Z")
 
 
-def position(axis: str) -> tree.Numbered:
-    """Where the axis is, in the program's coordinates."""
-    return tree.Numbered(tree.Number(float(FIRST_POSITION + AXES.index(axis))))
-
-
 def variable(name: str) -> tree.Named:
     """A variable of the program, or of the reader's own: each call has its own ones."""
     return tree.Named(name.lower(), False)
@@ -71,7 +66,6 @@ def handed_over(number: int) -> tree.Named:
     return tree.Named(f"_value {number}", True)
 
 
-AXES = ("X", "Y", "Z", "A", "B", "C")  # whose position is known
 # Variables by name: the first parameter of an array (0 for others) and its sizes; a text has one size, of 0.
 Names = dict[str, tuple[int, tuple[int, ...]]]
 TEXT = (0, (0,))
@@ -146,8 +140,8 @@ class LineTokens(TokenReader):
         if _SYSTEM.match(name) and self.take("["):
             axis = self.pop().text
             self.expect("]")
-            if axis not in AXES:
-                raise self.fault(f"{name}[{axis}]: the position of {', '.join(AXES)} is known", token.at)
+            if axis not in POSITIONS or not axis:
+                raise self.fault(f"{name}[{axis}]: the position of {', '.join(POSITIONS)} is known", token.at)
             return position(axis)
         parameter = self.parameter(token)
         if parameter is None and name[0] == "$":

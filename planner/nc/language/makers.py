@@ -85,6 +85,12 @@ def heidenhain_frame(making: Making, given: Given, *, cycle: int) -> Iterator[Ro
             raise ValueError(f"a scaling factor is above 0; {wrong[0]:g} is given")
         parts.scale = np.array(factors)
         parts.centre = np.array([given.get("CC" + letter, 0.0) * unit for letter in AXES])
+    uneven = len({*np.abs(parts.scale)}) > 1
+    if parts.rotation % 360.0 and (uneven or (parts.mirror != 1.0).any()):
+        raise ValueError(
+            "a rotation (cycle 10) together with a mirror image (8) or a scale of single axes (26) is not read: "
+            "which acts first is not documented; let the CAM system write the moves out"
+        )
     making.travel.programmed = parts.affine()
     return _in_force(making)
 

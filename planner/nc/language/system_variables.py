@@ -16,7 +16,7 @@ from planner.nc.language import tree
 from planner.nc.language.travel import Travel
 from planner.nc.language.travel_rows import FrameParts
 from planner.nc.program import PathControl
-from planner.nc.state import FURTHER_SYSTEMS, SYSTEMS, System, system_name
+from planner.nc.state import FURTHER_SYSTEMS, SYSTEMS, State, System, system_name
 
 # Words that restore modes, line by line.
 Modes = tuple[tuple[tuple[str, float], ...], ...]
@@ -141,73 +141,63 @@ def _motion_mode(motion: int) -> float:
     return 800.0 if motion < 0 else 10.0 * motion if motion <= 3 else float(motion)
 
 
-def _on(condition: bool) -> float:
-    return 1.0 if condition else 0.0
-
-
-_LINUXCNC_NAMES: dict[str, Callable[[SystemVariables], float]] = {
-    "_vmajor": lambda a: 2.9,
-    **dict.fromkeys(("_vminor", "_task", "_remap_level", "_adaptive_feed", "_feed_hold"), lambda a: 0.0),
-    "_motion_mode": lambda a: _motion_mode(a.interpreter.state.motion),
-    "_plane": lambda a: 10.0 * _PLANE[a.interpreter.state.normal],
-    "_ccomp": lambda a: 400.0,
-    "_metric": lambda a: _on(a.interpreter.state.unit == 1.0),
-    "_imperial": lambda a: _on(a.interpreter.state.unit != 1.0),
-    "_absolute": lambda a: _on(a.interpreter.state.absolute),
-    "_incremental": lambda a: _on(not a.interpreter.state.absolute),
-    "_inverse_time": lambda a: _on(a.interpreter.state.feed_mode == "inverse time"),
-    "_units_per_minute": lambda a: _on(a.interpreter.state.feed_mode == "per minute"),
-    "_units_per_rev": lambda a: _on(a.interpreter.state.feed_mode == "per turn"),
-    "_coord_system": lambda a: float(a.interpreter.state.system),
-    "_tool_offset": lambda a: _on(bool(a.interpreter.state.tool_offset.any())),
-    "_retract_r_plane": lambda a: _on(not a.interpreter.state.to_level),
-    "_retract_old_z": lambda a: _on(a.interpreter.state.to_level),
-    "_spindle_rpm_mode": lambda a: _on(not a.interpreter.state.spindle.surface_speed),
-    "_spindle_css_mode": lambda a: _on(a.interpreter.state.spindle.surface_speed),
-    "_ijk_absolute_mode": lambda a: _on(a.interpreter.state.absolute_centre),
-    "_lathe_diameter_mode": lambda a: _on(a.interpreter.state.diameters),
-    "_lathe_radius_mode": lambda a: _on(not a.interpreter.state.diameters),
-    "_spindle_on": lambda a: _on(a.interpreter.state.spindle.turning != 0),
-    "_spindle_cw": lambda a: _on(a.interpreter.state.spindle.turning > 0),
-    "_mist": lambda a: _on(a.event("M", (7.0, 9.0)) == 7.0),
-    "_flood": lambda a: _on(a.event("M", (8.0, 9.0)) == 8.0),
-    **dict.fromkeys(("_speed_override", "_feed_override"), lambda a: _on(a.event("M", (48.0, 49.0)) != 49.0)),
-    "_feed": lambda a: a.feed(),
-    "_rpm": lambda a: a.interpreter.state.spindle.speed,
-    **dict.fromkeys(("_current_tool", "_current_pocket"), lambda a: float(a.interpreter.state.tool_loaded)),
-    **dict.fromkeys(
-        ("_selected_tool", "_selected_pocket"), lambda a: float(a.interpreter.state.tool_selected)
-    ),
-    **{f"_{letter}": lambda a, axis=axis: a.here(axis) for axis, letter in enumerate("xyzabcuvw")},  # type: ignore[misc]
-    **{f"_abs_{letter}": lambda a, axis=axis: a.machine(axis) for axis, letter in enumerate("xyzabc")},  # type: ignore[misc]
+# By name: what the state, or all that is known, answers; true is 1.
+_LINUXCNC_NAMES: dict[str, Callable[[State, SystemVariables], float]] = {
+    "_vmajor": lambda s, a: 2.9,
+    **dict.fromkeys(("_vminor", "_task", "_remap_level", "_adaptive_feed", "_feed_hold"), lambda s, a: 0.0),
+    "_motion_mode": lambda s, a: _motion_mode(s.motion),
+    "_plane": lambda s, a: 10.0 * _PLANE[s.normal],
+    "_ccomp": lambda s, a: 400.0,
+    "_metric": lambda s, a: s.unit == 1.0,
+    "_imperial": lambda s, a: s.unit != 1.0,
+    "_absolute": lambda s, a: s.absolute,
+    "_incremental": lambda s, a: not s.absolute,
+    "_inverse_time": lambda s, a: s.feed_mode == "inverse time",
+    "_units_per_minute": lambda s, a: s.feed_mode == "per minute",
+    "_units_per_rev": lambda s, a: s.feed_mode == "per turn",
+    "_coord_system": lambda s, a: s.system,
+    "_tool_offset": lambda s, a: bool(s.tool_offset.any()),
+    "_retract_r_plane": lambda s, a: not s.to_level,
+    "_retract_old_z": lambda s, a: s.to_level,
+    "_spindle_rpm_mode": lambda s, a: not s.spindle.surface_speed,
+    "_spindle_css_mode": lambda s, a: s.spindle.surface_speed,
+    "_ijk_absolute_mode": lambda s, a: s.absolute_centre,
+    "_lathe_diameter_mode": lambda s, a: s.diameters,
+    "_lathe_radius_mode": lambda s, a: not s.diameters,
+    "_spindle_on": lambda s, a: s.spindle.turning != 0,
+    "_spindle_cw": lambda s, a: s.spindle.turning > 0,
+    "_mist": lambda s, a: a.event("M", (7.0, 9.0)) == 7.0,
+    "_flood": lambda s, a: a.event("M", (8.0, 9.0)) == 8.0,
+    **dict.fromkeys(("_speed_override", "_feed_override"), lambda s, a: a.event("M", (48.0, 49.0)) != 49.0),
+    "_feed": lambda s, a: a.feed(),
+    "_rpm": lambda s, a: s.spindle.speed,
+    **dict.fromkeys(("_current_tool", "_current_pocket"), lambda s, a: s.tool_loaded),
+    **dict.fromkeys(("_selected_tool", "_selected_pocket"), lambda s, a: s.tool_selected),
+    **{f"_{letter}": lambda s, a, axis=axis: a.here(axis) for axis, letter in enumerate("xyzabcuvw")},  # type: ignore[misc]
+    **{f"_abs_{letter}": lambda s, a, axis=axis: a.machine(axis) for axis, letter in enumerate("xyzabc")},  # type: ignore[misc]
 }
 
 
 def _linuxcnc_number(system: SystemVariables, number: int) -> float:
-    interpreter = system.interpreter
-    for code, first in ((280, 5161), (300, 5181)):
-        if first <= number < first + _AXES:
-            given = interpreter.state.homes.get(code)
-            return 0.0 if given is None or number - first >= 3 else float(given[number - first])
-    if number == 5210:
-        return _on(bool(interpreter.state.g92.any()))
-    if 5211 <= number < 5211 + _AXES:
-        return float(interpreter.state.g92[number - 5211]) if number - 5211 < 3 else 0.0
-    if number == 5220:
-        return system.system() + 1.0
-    if 5221 <= number < 5221 + 20 * len(SYSTEMS):
-        work_system, axis = divmod(number - 5221, 20)
-        return system.offset(work_system, axis)
-    if number == 5400:
-        return float(interpreter.state.tool_loaded)
-    if 5401 <= number <= 5403:
-        return float(interpreter.state.tool_offset[number - 5401])
-    if number == 5410:
-        tool = interpreter.state.tools.get(interpreter.state.tool_loaded)
-        return 0.0 if tool is None else tool.diameter
+    state = system.interpreter.state
+    tool, none = state.tools.get(state.tool_loaded), state.zeros()
+    places = {
+        5161: state.homes.get(280, none),
+        5181: state.homes.get(300, none),
+        5211: state.g92,
+        5401: state.tool_offset,
+    }
+    for first, place in places.items():  # x, y, z; the other axes are 0
+        if first <= number < first + 3:
+            return float(place[number - first])
+    if 5221 <= number < 5221 + _OF_ONE * len(SYSTEMS):
+        return system.offset(*divmod(number - 5221, _OF_ONE))
     if 5420 <= number < 5420 + _AXES:
         return system.here(number - 5420)
-    return 0.0
+    if number == 5220:
+        return system.system() + 1.0
+    others = {5210: bool(state.g92.any()), 5400: state.tool_loaded, 5410: tool.diameter if tool else 0.0}
+    return float(others.get(number, 0.0))
 
 
 class PositionVariables(SystemVariables):
@@ -233,7 +223,7 @@ class LinuxcncVariables(SystemVariables):
         if parameter == "_call_level":
             return float(depth)
         if isinstance(parameter, str):
-            return _LINUXCNC_NAMES[parameter](self)
+            return float(_LINUXCNC_NAMES[parameter](self.interpreter.state, self))
         return _linuxcnc_number(self, parameter)
 
 

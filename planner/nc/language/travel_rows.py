@@ -193,29 +193,27 @@ def travel_rows_of(words: Words) -> Iterator[TravelRow]:
 
 @dataclass
 class FrameParts:
-    """Heidenhain's: datum, mirror (1 or -1), rotation [degrees], scale and its centre; all (3,) [mm].
-    Fanuc's have centres of the mirror image and of the rotation, and the axis of the latter, too."""
+    """A frame d + R S M p: the mirror image M, the scale S and the rotation R, each about its centre, that of
+    the rotation mirrored and scaled as the points are, and the datum d.
+
+    mirror (1 or -1), scale and all centres: (3,) [mm]; rotation in degrees about the axis `normal`
+    """
 
     datum: FloatArray = field(default_factory=lambda: np.zeros(3))
     mirror: FloatArray = field(default_factory=lambda: np.ones(3))
-    rotation: float = 0.0
+    mirrored_at: FloatArray = field(default_factory=lambda: np.zeros(3))
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
     centre: FloatArray = field(default_factory=lambda: np.zeros(3))
-    mirrored_at: FloatArray = field(default_factory=lambda: np.zeros(3))
+    rotation: float = 0.0
     about: FloatArray = field(default_factory=lambda: np.zeros(3))
     normal: int = 2
 
     def affine(self) -> tuple[FloatArray, FloatArray]:
-        """Matrix (3, 3) and shift (3,). Raises ValueError for what depends on an order that is not known."""
-        uneven = len({*np.abs(self.scale)}) > 1
-        if self.rotation % 360.0 and (uneven or (self.mirror != 1.0).any()):
-            raise ValueError(
-                "a rotation (cycle 10) together with a mirror image (8) or a scale of single axes (26) is not read: "
-                "which acts first is not documented; let the CAM system write the moves out"
-            )
-        stretched = np.diag(self.scale * self.mirror)
-        about = self.centre - np.diag(self.scale) @ self.centre
-        return turned(self.rotation, 2) @ stretched, self.datum + about
+        """Matrix (3, 3) and shift (3,) [mm]."""
+        mirror, scale, turn = np.diag(self.mirror), np.diag(self.scale), turned(self.rotation, self.normal)
+        shift = scale @ (self.mirrored_at - mirror @ self.mirrored_at) + self.centre - scale @ self.centre
+        about = scale @ mirror @ self.about + shift
+        return turn @ scale @ mirror, self.datum + (turn @ shift + about - turn @ about)
 
 
 def turned(degrees: float, axis: int) -> FloatArray:

@@ -21,12 +21,10 @@ from functools import partial
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, in_plane
 from planner.nc.language import swivel, tree
 from planner.nc.language.making import Maker, Making, Row, around, equal_steps
 from planner.nc.language.source import SourceLine
-from planner.nc.language.travel_rows import FrameParts, turned
 
 AXES = "XYZ"
 # Their own words, by code; those that have none end something, and come before the rest of their line.
@@ -111,17 +109,9 @@ def _frame(making: Making, given: Mapping[str, float], *, code: str) -> None:
     parts = travel.parts
     if parts.rotation % 360.0 and (parts.mirror < 0.0).any():
         making.assume("a mirror image together with a rotation: the rotation is that of the mirrored points")
-    matrix, shift = affine(parts)
+    matrix, shift = parts.affine()
     if travel.active or not (matrix == np.eye(3)).all():
         travel.set_frame(matrix, shift)
-
-
-def affine(parts: FrameParts) -> tuple[FloatArray, FloatArray]:
-    """Matrix (3, 3) and shift (3,) [mm] of a mill's frame."""
-    mirror, scale, turn = np.diag(parts.mirror), np.diag(parts.scale), turned(parts.rotation, parts.normal)
-    shift = scale @ (parts.mirrored_at - mirror @ parts.mirrored_at) + parts.centre - scale @ parts.centre
-    about = scale @ mirror @ parts.about + shift
-    return turn @ scale @ mirror, turn @ shift + about - turn @ about
 
 
 def _tilted(making: Making, given: Mapping[str, float]) -> None:

@@ -78,7 +78,6 @@ from planner.feedrate.reference.piecewise import (
     solve_pieces,
     too_few,
     too_large,
-    with_prices,
 )
 from planner.feedrate.solution import FeedrateSolution, Status
 
@@ -133,7 +132,7 @@ class SequentialConvex:
             return too_large(problem, self.points_max, "sequential-convex", repr(self))
         guess = Reachability().solve(problem).require()  # from rest to rest there always is one
         found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self), progress)
-        return solution_of(problem, found, repr(self), began, priced=False)
+        return solution_of(problem, found, repr(self), began)
 
 
 def _solve_piece(
@@ -345,6 +344,4 @@ class ExactMotion:
         sentence = (
             f"{found.sentence}; with constant jerks between the points {100.0 * later:+.2g} % of the time"
         )
-        return with_prices(
-            problem, replace(slower, sentence=sentence, solve_time=time.perf_counter() - began)
-        )
+        return replace(slower, sentence=sentence, solve_time=time.perf_counter() - began)

@@ -95,7 +95,6 @@ class Sizes:
     corners_compared: int = _size(EFFORT, 1_000_000, 2_000)  # points: some 10 s and 1 GB
     # points of a motion on a path that is slowed down by 2e-5 before its verdict (planning/optimal/tighten.py)
     slowed_before: int = _size(EFFORT, 50_000, 10)
-    priced: int = _size(EFFORT, 200_000, 60_000)  # points of all problems solved again for prices: a second
 
     # Pages, pictures and tables.
     page_samples: int = _size(SHOWN, 150_000, 500)  # the page of 250,000 blocks then has less than 20 MB

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
@@ -12,7 +12,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.errors import NotSolvedError
 from planner.feedrate.constraints.limit import RowLimit, RowPoint
-from planner.feedrate.constraints.limits import ACCELERATION, JERK, ROWS, VELOCITY
+from planner.feedrate.constraints.limits import ACCELERATION, JERK, ROWS
 from planner.feedrate.constraints.problem import FeedrateProblem
 
 
@@ -25,52 +25,6 @@ class Status(Enum):
     ITERATION_LIMIT = "iteration limit"
     NUMERICAL_ERROR = "numerical error"
     TOO_LARGE = "too large"  # for this solver, which was not tried
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Prices:
-    """The prices of the limits: derivatives of the cycle time by them, never positive, on the solved grid.
-
-    velocity, acceleration, jerk : (A,) dT/d(axis limit) [s per mm/s, mm/s2, mm/s3]
-    feed_sq_max                  : (P,) dT/d(feed_sq_max) of each point [s per mm2/s2]; what an axis velocity
-                                   or the acceleration at a jump of the curvature costs is in here too, as
-                                   part of the sums above
-    """
-
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
-    feed_sq_max: FloatArray
-
-    def __post_init__(self) -> None:
-        axes = len(self.jerk)
-        for name in ("velocity", "acceleration", "jerk"):
-            freeze(self, name, np.float64, (axes,))
-        freeze(self, "feed_sq_max", np.float64, (None,))
-
-    @classmethod
-    def from_relative(
-        cls, problem: FeedrateProblem, acceleration: FloatArray, jerk: FloatArray, feed_sq_max: FloatArray
-    ) -> Prices:
-        """From dT/d(ln limit) [s].
-
-        acceleration, jerk : (A,) of the rows of each axis
-        feed_sq_max        : (P,) of every point's bound, which counts for the axis limit it comes from
-        """
-        number = {name: k for k, name in enumerate(problem.bound_names)}
-
-        def of_caps(called: Callable[[str], str]) -> FloatArray:
-            found = [problem.feed_sq_bound == number.get(called(axis), -1) for axis in problem.axes]
-            return np.array([feed_sq_max[points].sum() for points in found])
-
-        velocity = 2.0 * of_caps(VELOCITY.called)
-        jump = of_caps(ACCELERATION.called_at_jump)
-        return cls(
-            velocity=velocity / problem.velocity,
-            acceleration=(acceleration + jump) / problem.acceleration,
-            jerk=jerk / problem.jerk,
-            feed_sq_max=feed_sq_max / problem.feed_sq_max,
-        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -108,8 +62,7 @@ class FeedrateSolution:
     iterations: int = 0  # of an iterative solver; the largest of all pieces
     effort: dict[str, int] = field(default_factory=dict)  # what else the solver counted, by name
     jerk_limited: bool = False  # True if the jerk limits of the problem were kept
-    prices: Prices | None = None  # what the limits cost, if the solver knows
-    # of limits and kinematics, if the solver knows; see feedrate/lagrangian.py
+    # of limits and kinematics, if the solver knows; see feedrate/slopes.py
     multipliers: Multipliers | None = None
 
     def __post_init__(self) -> None:

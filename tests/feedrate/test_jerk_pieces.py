@@ -16,8 +16,8 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk import solver
 from planner.feedrate.jerk.solver import JerkLimited
-from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.sampling.samples import sample_path
+from planner.feedrate.slopes import slopes_of
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
 from planner.machine import load_machine
@@ -48,7 +48,7 @@ def test_a_long_piece_in_windows_is_what_it_is_in_one(points):
     assert whole.effort["windows"] == 1 < found.effort["windows"]
     assert not faults(problem, found)
     assert found.cycle_time == pytest.approx(whole.cycle_time, rel=1e-4)
-    values = [lagrangian(problem, solution).jerk.sum() for solution in (found, whole)]
+    values = [slopes_of(problem, solution).jerk.sum() for solution in (found, whole)]
     assert values[0] == pytest.approx(values[1], rel=0.02)
 
 

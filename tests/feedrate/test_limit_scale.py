@@ -13,7 +13,6 @@ from benchmarks.solvers.jerk_campaign import small_problem
 from benchmarks.solvers.sequential_convex import SequentialConvex
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
-from planner.feedrate.lagrangian import lagrangian
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.solution import constraint_ratios, ratios_by_limit
@@ -134,19 +133,3 @@ def test_ratios_are_to_the_limits_of_each_point():
             power = 2 if limit < first + len(problem.axes) else 3
             assert (there[[at - 1, at]] <= BY**power * plain[[at - 1, at]] * (1 + 1e-12)).all()
             assert (there[[at - 1, at]] >= plain[[at - 1, at]]).all()
-
-
-def test_the_lagrangian_changes_with_the_scale_as_the_time_does():
-    """Envelope theorem: a little more scale on a stretch costs what two solutions say."""
-    problem = small_problem(4)
-    solver = JerkLimited(tol=1e-6)
-    stretch = np.zeros(len(problem))
-    stretch[len(problem) // 3 : len(problem) // 2] = 1.0
-    step = 1e-3
-    up, down = (
-        solver.solve(scaled(problem, 1.0 + way * step * stretch)).require().cycle_time for way in (1, -1)
-    )
-    solution = solver.solve(problem).require()
-    more = lagrangian(scaled(problem, 1.0 + 1e-6 * stretch), solution).value.sum()
-    less = lagrangian(scaled(problem, 1.0 - 1e-6 * stretch), solution).value.sum()
-    assert (more - less) / 2e-6 == pytest.approx((up - down) / (2 * step), rel=0.02)

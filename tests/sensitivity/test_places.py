@@ -15,7 +15,7 @@ from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine
 from planner.planning.job.plan import Plan
-from planner.sensitivity.places import bounds_but_speeds, bounds_with
+from planner.sensitivity.path_prices import bounds_but_speeds, bounds_with
 from planner.sensitivity.prices import MORE_LIMIT
 from planner.sensitivity.records import PlacePrices
 
@@ -63,11 +63,7 @@ def test_more_feed_on_one_line_saves_what_is_foretold(zigzag: Plan, segment: int
 def test_places_add_up_to_the_whole(zigzag: Plan) -> None:
     assert zigzag.prices is not None
     places = places_of(zigzag)
-    assert places.tolerance is not None
-    assert zigzag.prices.tolerance is not None
-    assert len(places.tolerance) == 5
-    assert places.tolerance[[0, -1]].tolist() == [0.0, 0.0], "nothing is rounded where the motion stops"
-    assert places.tolerance.sum() == pytest.approx(zigzag.prices.tolerance, rel=0.05)
+    assert places.tolerance is None
     assert places.feed.sum() == pytest.approx(-zigzag.prices.feed * TENTH, rel=0.05)
     assert (places.limits >= places.feed - 1e-6).all()
 

@@ -29,13 +29,11 @@ def on_splines():
 
 
 @pytest.mark.slow
-def test_on_rounded_corners_what_is_found_lies_in_the_range_and_the_tolerance_is_a_number(on_corners):
+def test_on_rounded_corners_what_is_found_lies_in_the_range(on_corners):
     rows = {row["limit"]: row for row in on_corners["rows"]}
     for row in rows.values():
         assert row["right"], row
-    assert len(rows) >= 5
-    assert not rows["tolerance"]["hint"]
-    assert rows["tolerance"]["ratio"] == pytest.approx(1.0, abs=0.12)
+    assert len(rows) >= 4
 
 
 @pytest.mark.shows("prices", "sampled: plans made again with that limit changed")
@@ -54,16 +52,15 @@ def test_on_splines_a_saving_is_right_or_a_range_with_what_was_found_inside(on_s
 @pytest.mark.slow
 def test_where_the_period_may_take_its_share_of_more_everything_is_a_hint_and_right():
     """Chords between samples 4 ms apart use 40 % of the tolerance: a faster motion has to leave them more."""
-    among = ("feed", "tolerance")
+    among = ("feed",)
     machine = problems.five_points_machine()
     result = compared("five points", problems.five_points(), machine, "bezier", among)
-    assert [row["limit"] for row in result["rows"]] == ["feed", "tolerance"]
+    assert [row["limit"] for row in result["rows"]] == ["feed"]
     for row in result["rows"]:
         assert row["hint"], row
         assert row["least_s"] <= 0.0 < row["found_s"] <= row["most_s"], row
     fine = machine.model_copy(update={"dt": 1e-4})
     plan = planner.plan(problems.five_points(), fine, method="optimal", corner="bezier")
-    assert "tolerance" not in plan.prices.hints
     assert plan.prices.ranges["feed"][0] > 0.0
 
 

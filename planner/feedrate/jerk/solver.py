@@ -38,7 +38,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
@@ -52,8 +52,7 @@ from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.settings import WindowSettings
 from planner.feedrate.jerk.window import Window
-from planner.feedrate.lagrangian import lagrangian
-from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
+from planner.feedrate.solution import FeedrateSolution, Multipliers, Status
 
 PLACES_NAMED = 3  # in a sentence
 POINTS_SHARED = SIZES.points_shared
@@ -94,11 +93,11 @@ class JerkLimited(WindowSettings):
                 f", except {len(stops)} full stops where the method did not converge, at s = {places}{more} mm: "
                 "coarsen the path where points nearly coincide, refine it where the feed changes much between points"
             )
-        solution = FeedrateSolution(
+        return FeedrateSolution(
             status=Status.ACCEPTABLE if stops else Status.OPTIMAL,
             sentence=sentence,
             solver=repr(self),
-            solve_time=0.0,
+            solve_time=time.perf_counter() - began,
             iterations=max(piece.iterations for piece in pieces),
             jerk_limited=True,
             effort={name: sum(piece.effort[name] for piece in pieces) for name in pieces[0].effort},
@@ -108,9 +107,6 @@ class JerkLimited(WindowSettings):
             duration=profile.duration,
             multipliers=Multipliers(rows=profile.rows, feed=profile.feed, dynamics=profile.dynamics),
         )
-        found = lagrangian(problem, solution, columns)
-        prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
-        return replace(solution, prices=prices, solve_time=time.perf_counter() - began)
 
 
 def _solve(pieces: list[Chain], counted: _Counted) -> None:

@@ -126,7 +126,7 @@ class JerkLimitedNLP:
             took = time.perf_counter() - began
             return FeedrateSolution.failed(problem, guess.status, guess.sentence, repr(self), took)
         found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self), progress)
-        solution = solution_of(problem, found, repr(self), began, priced=True)
+        solution = solution_of(problem, found, repr(self), began)
         at_rest = not (problem.feed_sq_start.any() or problem.feed_sq_end.any())
         return polished(problem, solution) if solution.solved and at_rest else solution
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.problem import FeedrateProblem
-from planner.feedrate.lagrangian import lagrangian
-from planner.feedrate.solution import FeedrateSolution, Multipliers, Prices, Status
+from planner.feedrate.solution import FeedrateSolution, Multipliers, Status
 
 # Fewer intervals cannot go from rest to rest: the jerk must be positive, negative and positive again.
 INTERVALS_MIN = 3
@@ -71,15 +70,13 @@ def solve_pieces(
     return replace(whole, iterations=iterations, columns=np.concatenate(columns))
 
 
-def solution_of(
-    problem: FeedrateProblem, found: Found, solver: str, began: float, *, priced: bool
-) -> FeedrateSolution:
-    """The values found, as a solution; `priced` where its jerk is constant on every interval."""
+def solution_of(problem: FeedrateProblem, found: Found, solver: str, began: float) -> FeedrateSolution:
+    """The values found, as a solution."""
     took = time.perf_counter() - began
     if found.columns is None:
         return FeedrateSolution.failed(problem, found.status, found.sentence, solver, took, found.iterations)
     feed_sq, acc, jerk, duration, at_point, between, dynamics = found.columns[:, :7].T
-    solution = FeedrateSolution(
+    return FeedrateSolution(
         status=found.status,
         sentence=found.sentence,
         solver=solver,
@@ -96,11 +93,3 @@ def solution_of(
             dynamics=dynamics,
         ),
     )
-    return with_prices(problem, solution) if priced else solution
-
-
-def with_prices(problem: FeedrateProblem, solution: FeedrateSolution) -> FeedrateSolution:
-    """The solution with the prices that follow from its multipliers."""
-    found = lagrangian(problem, solution)
-    prices = Prices.from_relative(problem, found.acceleration, found.jerk, found.feed_sq_max)
-    return replace(solution, prices=prices)

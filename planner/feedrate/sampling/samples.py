@@ -152,33 +152,6 @@ def _joints(path: SmoothPath) -> Joints:
     )
 
 
-def moved_grid(samples: PathSamples, path: SmoothPath) -> PathSamples:
-    """The corresponding grid on a neighbouring path with the same joints: corners keep their parameters, the
-    free part of each leg is scaled from its first and last block's ends, and the margins stay as they are."""
-    legs, element, segment = path.legs, samples.element, samples.segment
-    free = element >= 0
-    leg = np.maximum(element, 0)
-    begin = legs.offset[segment]
-    closes = segment + 1 == legs.first[leg + 1]  # the last block of its leg
-    end = np.where(closes, legs.length[leg], legs.offset[np.minimum(segment + 1, len(legs.offset) - 1)])
-
-    def span(on: SmoothPath) -> tuple[FloatArray, FloatArray]:
-        return np.maximum(begin, on.d_out[leg]), np.minimum(end, legs.length[leg] - on.d_in[leg + 1])
-
-    (a, b), (a_new, b_new) = span(samples.path), span(path)
-    rate = np.divide(b_new - a_new, b - a, out=np.ones(len(a)), where=free & (b > a))
-    w0, w1 = (np.where(free, a_new + (w - a) * rate, w) for w in (samples.w0, samples.w1))
-    last = np.zeros(len(samples), dtype=bool)
-    last[samples.piece[1:] - 1] = True
-    table = element_table(path)
-    axes = np.full(samples.d1.shape[1], np.inf)  # for the margins, which are not asked for
-    limits = PathLimits(path.toolpath.feed, axes, axes, axes)
-    # read-only arrays would compile a second kernel
-    grid = Intervals(element.copy(), w0, w1, segment.copy(), last)
-    columns = evaluate(table, grid, limits)._replace(margin=samples.margin)
-    return replace(samples, path=path, table=table, w0=w0, w1=w1, **columns._asdict())
-
-
 def insert_points(samples: PathSamples, interval: Array, s: FloatArray) -> PathSamples:
     """Add points at arc lengths `s` (n,) [mm] inside straight intervals `interval` (n,), sorted by place.
 

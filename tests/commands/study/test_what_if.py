@@ -143,13 +143,13 @@ def test_forecasts_beside_plans_made_again() -> None:
     )
     changes = [
         Setting(name="axes.x.jerk", value=1.2e5),
-        Setting(name="tolerance", value=0.03),
+        Setting(name="axes.y.jerk", value=1.2e5),
         Setting(name="feed", value=1.1),
     ]
     labels: list[str] = []
     rows = what_if(job, changes, lambda label, stage, done: labels.append(label))
     assert [it.label for it in rows] == [
-        "as it is", "axes.x.jerk=120000", "tolerance=0.03", "feed=1.1", "all together"
+        "as it is", "axes.x.jerk=120000", "axes.y.jerk=120000", "feed=1.1", "all together"
     ]  # fmt: skip
     assert set(labels) == {it.label for it in rows}
     for it in rows[1:]:

@@ -71,8 +71,6 @@ def small_problem(seed: int) -> FeedrateProblem:
         feed_sq_bound=np.zeros(len(q), dtype=int),
         bound_names=("feed",),
         margin=np.zeros(len(q)),
-        feed_sq_start=np.zeros(1),
-        feed_sq_end=np.zeros(1),
     )
 
 

@@ -228,6 +228,4 @@ def _problem(
         feed_sq_bound=np.pad(np.where(slower, 1 + axis, 0), 1, mode="edge"),
         bound_names=("feed", *(f"velocity.{letter}" for letter in AXES[:axes])),
         margin=np.zeros(points),
-        feed_sq_start=np.zeros(1),
-        feed_sq_end=np.zeros(1),
     )

@@ -126,8 +126,6 @@ class SequentialConvex:
         status of the whole. `iterations` are those of ipopt, summed over the passes, of the piece that took
         most."""
         began = time.perf_counter()
-        if problem.feed_sq_start.any() or problem.feed_sq_end.any():
-            raise ValueError("SequentialConvex: pieces must start and end at rest")
         if len(problem) > self.points_max:
             return too_large(problem, self.points_max, "sequential-convex", repr(self))
         guess = Reachability().solve(problem).require()  # from rest to rest there always is one

@@ -11,9 +11,8 @@ so the gap phi = high - low is concave and positive at x = 0 (standing still is 
 feasible x is found by Newton's method on phi from the right: on a concave piecewise linear function it never
 overshoots the root and ends after finitely many steps, two or three in practice.
 
-For a piece that ends at rest the set of controllable x is [0, K_i], because (x, u) = (0, 0) satisfies every
-row. For x_end > 0 it has a lower end too; the forward pass does not need it, it keeps to K from above and
-x_end is compared at the end. Cost: a few dozen flops per point and axis; no tolerance, no scaling needed.
+A piece begins and ends at rest, so the set of controllable x is [0, K_i], because (x, u) = (0, 0) satisfies
+every row. Cost: a few dozen flops per point and axis; no tolerance, no scaling needed.
 
 The passes are greedy, and on the grid that is the optimum only where no interval leads from a larger x_i to a
 smaller x_{i+1} at best: -d(high)/dx <= 1/(2 h), so 2 h |r''_k| <= |r'_k| for the row that acts. It fails in
@@ -40,8 +39,6 @@ NEWTON_STEPS = 60
 # 1e-9 counts. Not rounding either: with a u of 1e-13 of the limit the greedy pass would trade the last digit
 # of x_i for all of u_i (module text).
 NEGLIGIBLE = 1e-10
-# Relative slack under which an end condition counts as reachable: rounding of the passes [-].
-ROUNDING = 1e-9
 
 
 class AxisRows(NamedTuple):
@@ -60,8 +57,6 @@ class Bounds(NamedTuple):
     s: FloatArray  # (P,), like the next two
     margin: FloatArray
     x_max: FloatArray
-    x_start: FloatArray  # (G,), like the next
-    x_end: FloatArray
 
 
 class Interval(NamedTuple):
@@ -84,19 +79,7 @@ def _bounds_of(problem: FeedrateProblem) -> Bounds:
         s=problem.s,
         margin=problem.margin,
         x_max=problem.feed_sq_limit,
-        x_start=problem.feed_sq_start,
-        x_end=problem.feed_sq_end,
     )
-
-
-def controllable_sets(problem: FeedrateProblem) -> FloatArray:
-    """(P,) K, the largest feed^2 at each point from which the end of its piece can still be reached [mm2/s2].
-
-    Where a piece ends at rest exactly the feeds with feed^2 in [0, K] are controllable. Where it ends in
-    motion there is a lower end as well, which is not looked for. NaN on pieces whose end asks for more than
-    its own bound allows.
-    """
-    return np.asarray(_controllable(axis_rows(problem), _bounds_of(problem)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,17 +87,10 @@ class Reachability:
     """The numba reachability solver; it has no settings."""
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
-        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece cannot be joined."""
+        """Time-optimal second-order profile."""
         began = time.perf_counter()
-        x, u, bad_piece = _solve(axis_rows(problem), _bounds_of(problem))
+        x, u = _solve(axis_rows(problem), _bounds_of(problem))
         took = time.perf_counter() - began
-        if bad_piece >= 0:
-            at = problem.s[problem.piece[bad_piece]]
-            sentence = (
-                f"piece {bad_piece} (from s = {at:.6g} mm): the speeds at its ends cannot be joined within the limits; "
-                "lower them or loosen the limits"
-            )
-            return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), took)
         if not (np.isfinite(x).all() and np.isfinite(u).all()):
             sentence = "the profile is not finite; check the path for points that coincide"
             return FeedrateSolution.failed(problem, Status.NUMERICAL_ERROR, sentence, repr(self), took)
@@ -208,41 +184,25 @@ def largest_feed_sq(rows, on, x_max):
 
 @njit(cache=True, error_model="numpy")
 def _backward(rows, bounds, g, reach):
-    """Write K of piece g into reach (P,); False, and NaN, if its end is beyond its own bound."""
+    """Write K of piece g into reach (P,)."""
     s, margin, x_max = bounds.s, bounds.margin, bounds.x_max
     first, last = bounds.piece[g], bounds.piece[g + 1] - 1
-    if bounds.x_end[g] > x_max[last] * (1.0 + ROUNDING):
-        reach[first : last + 1] = np.nan
-        return False
-    reach[last] = min(bounds.x_end[g], x_max[last])
+    reach[last] = 0.0
     for i in range(last - 1, first - 1, -1):
         on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])
         reach[i] = largest_feed_sq(rows, on, x_max[i])
-    return True
-
-
-@njit(cache=True, error_model="numpy")
-def _controllable(rows, bounds):
-    """K (P,) of all pieces."""
-    reach = np.empty(len(bounds.s))
-    for g in range(len(bounds.piece) - 1):
-        _backward(rows, bounds, g, reach)
-    return reach
 
 
 @njit(cache=True, error_model="numpy")
 def _solve(rows, bounds):
-    """Backward and forward pass over all pieces; returns x, u and the first infeasible piece or -1."""
-    piece, s, margin, x_max, x_start, x_end = bounds
+    """Backward and forward pass over all pieces; returns x and u."""
+    piece, s, margin, x_max = bounds
     points = len(s)
-    reach = np.empty(points)
-    x = np.empty(points)
-    u = np.zeros(points)
+    reach, x, u = np.empty(points), np.empty(points), np.zeros(points)
     for g in range(len(piece) - 1):
         first, last = piece[g], piece[g + 1] - 1
-        if not _backward(rows, bounds, g, reach) or x_start[g] > reach[first] * (1.0 + ROUNDING):
-            return x, u, g
-        x[first] = min(x_start[g], reach[first])
+        _backward(rows, bounds, g, reach)
+        x[first] = 0.0
         for i in range(first, last):
             on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])
             low, _, high, _ = _interval(rows, on, x[i], _parallel(rows, on, x_max[i]))
@@ -250,6 +210,4 @@ def _solve(rows, bounds):
             # but for rounding, which exceeds the limits where h is a billionth of its neighbours.
             u[i] = max(high, low)
             x[i + 1] = min(max(x[i] + 2.0 * on.h * u[i], 0.0), on.target)
-        if x[last] < x_end[g] * (1.0 - ROUNDING):
-            return x, u, g
-    return x, u, -1
+    return x, u

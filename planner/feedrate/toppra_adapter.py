@@ -10,8 +10,6 @@ What toppra 0.6 adds silently, in its own unscaled units, and what it would cost
 
     |u|, |x| <= 1e8                    bounds in Seidel's wrapper: a rapid of 10 m/s in mm/s is already at 1e8
     x_{i+1} lowered by min(1e-8, 1e-4 x_{i+1})   on every forward step: 1e-4 of a small x (metres: every x below 1e-4 m2/s2)
-    x_start up to 1e-5 above reach     is accepted; 3 mm/s from nowhere, in metres
-    x_end above its own bound          is accepted, whatever the limits at the last point
     objective x - 1e-9 u               instead of x: wrong vertex where 2 h < 1e-9
     rows within 1e-10 of parallel      are not intersected; rows are met to 1e-10
     u_i and x_{i+1} - x_i              differ by the lowering above
@@ -48,8 +46,6 @@ from planner.feedrate.solution import FeedrateSolution, Status
 FEED_SQ_SCALE = 1e6
 # The limit in every row [-], the mean of 1 and `FEED_SQ_SCALE`: no coefficient is near 1e-10 then.
 ROW_SCALE = 1e3
-# Relative slack under which an end speed counts as allowed: rounding, as in the own kernel [-].
-ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +53,7 @@ class ToppraSolver:
     """toppra's TOPPRA with Seidel's solver; it has no settings."""
 
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
-        """Time-optimal second-order profile; INFEASIBLE if the ends of a piece cannot be joined."""
+        """Time-optimal second-order profile."""
         toppra = _import_toppra()
         began = time.perf_counter()
         x, u = np.empty(len(problem)), np.zeros(len(problem))
@@ -66,10 +62,10 @@ class ToppraSolver:
                 first, last = problem.piece[g], problem.piece[g + 1] - 1
                 failure = _solve_piece(toppra, problem, g, x[first : last + 1], u[first:last])
                 if failure is not None:
-                    status, reason = failure
-                    sentence = f"piece {g} (from s = {problem.s[first]:.6g} mm): {reason}"
+                    sentence = f"piece {g} (from s = {problem.s[first]:.6g} mm): {failure}"
+                    took = time.perf_counter() - began
                     return FeedrateSolution.failed(
-                        problem, status, sentence, repr(self), time.perf_counter() - began
+                        problem, Status.NUMERICAL_ERROR, sentence, repr(self), took
                     )
         return FeedrateSolution.second_order(
             problem,
@@ -79,20 +75,6 @@ class ToppraSolver:
             solver=repr(self),
             solve_time=time.perf_counter() - began,
         )
-
-    def controllable_sets(self, problem: FeedrateProblem) -> FloatArray:
-        """(P, 2) lower and upper end of the controllable feed^2 at each point [mm2/s2], to compare with
-        `reachability.controllable_sets`; NaN where toppra finds none."""
-        toppra = _import_toppra()
-        sets = np.full((len(problem), 2), np.nan)
-        with _silent(logging.getLogger("toppra")):
-            for g, (first, beyond) in enumerate(zip(problem.piece[:-1], problem.piece[1:], strict=True)):
-                algorithm, length, time_unit = _algorithm(toppra, problem, g)
-                end = math.sqrt(problem.feed_sq_end[g]) / (length / time_unit)
-                found = algorithm.compute_controllable_sets(end, end)
-                if found is not None:
-                    sets[first:beyond] = found * (length / time_unit) ** 2
-        return sets
 
 
 def _algorithm(toppra: Any, problem: FeedrateProblem, g: int) -> tuple[Any, float, float]:
@@ -107,32 +89,17 @@ def _algorithm(toppra: Any, problem: FeedrateProblem, g: int) -> tuple[Any, floa
     return algorithm, length, time_unit
 
 
-def _solve_piece(
-    toppra: Any, problem: FeedrateProblem, g: int, x: FloatArray, u: FloatArray
-) -> tuple[Status, str] | None:
-    """Solve piece g into x (n+1,) and u (n,); on failure the status, and why with a remedy."""
-    unreachable = (
-        Status.INFEASIBLE,
-        "the speeds at its ends cannot be joined within the limits; lower them or loosen the limits",
-    )
-    x_start, x_end = problem.feed_sq_start[g], problem.feed_sq_end[g]
-    last = problem.piece[g + 1] - 1
-    if x_end > problem.feed_sq_limit[last] * (1.0 + ROUNDING):
-        return unreachable
+def _solve_piece(toppra: Any, problem: FeedrateProblem, g: int, x: FloatArray, u: FloatArray) -> str | None:
+    """Solve piece g into x (n+1,) and u (n,); on failure why, with a remedy."""
     algorithm, length, time_unit = _algorithm(toppra, problem, g)
     feed = length / time_unit
-    algorithm.compute_parameterization(math.sqrt(x_start) / feed, math.sqrt(x_end) / feed)
+    algorithm.compute_parameterization(0.0, 0.0)
     data = algorithm.problem_data
     codes = toppra.algorithm.algorithm.ParameterizationReturnCode
-    if data.return_code == codes.FailUncontrollable and max(x_start, x_end) > 0.0:
-        return unreachable
     if data.return_code != codes.Ok or not (
         np.isfinite(data.sd_vec).all() and np.isfinite(data.sdd_vec).all()
     ):
-        return (
-            Status.NUMERICAL_ERROR,
-            f"toppra ended with {data.return_code.name}; use the solver Reachability",
-        )
+        return f"toppra ended with {data.return_code.name}; use the solver Reachability"
     x[:] = (data.sd_vec * feed) ** 2
     u[:] = data.sdd_vec * (length / time_unit**2)
     return None
@@ -144,8 +111,7 @@ def _units(problem: FeedrateProblem, g: int) -> tuple[float, float]:
     first, last = problem.piece[g], problem.piece[g + 1] - 1
     along = np.abs(problem.d1[first : last + 1]) / problem.acceleration_limit[first : last + 1]
     u_max = float((1.0 / along.max(axis=1)).max())
-    ends = max(problem.feed_sq_start[g], problem.feed_sq_end[g])
-    reachable = u_max * (problem.s[last] - problem.s[first]) + ends
+    reachable = u_max * (problem.s[last] - problem.s[first])
     x_max = float(min(problem.feed_sq_limit[first : last + 1].max(), reachable))
     length = x_max / (u_max * FEED_SQ_SCALE)
     return 2.0 ** round(math.log2(length)), 2.0 ** round(0.5 * math.log2(length / u_max))

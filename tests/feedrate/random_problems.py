@@ -45,8 +45,6 @@ def make_problem(
         "feed_sq_bound": np.zeros(points, dtype=int),
         "bound_names": ("feed",),
         "margin": np.zeros(points),
-        "feed_sq_start": np.zeros(len(piece) - 1),
-        "feed_sq_end": np.zeros(len(piece) - 1),
     }
     return FeedrateProblem(**(values | fields))
 
@@ -96,8 +94,7 @@ def random_curve(rng: np.random.Generator, points: int, axes: int) -> tuple[Floa
 
 
 def random_problem(seed: int) -> FeedrateProblem:
-    """Seeded problem in 2, 3 or 6 dimensions: several pieces, jumps of the curvature and of the feed, margins; in every second
-    one non-zero speeds at the ends (which not every problem can join)."""
+    """Seeded problem in 2, 3 or 6 dimensions: several pieces, jumps of the curvature and of the feed, margins."""
     rng = np.random.default_rng([20, seed])
     axes = (2, 3, 6)[seed % 3]
     counts = rng.integers(3, 200, rng.integers(1, 4))
@@ -111,8 +108,6 @@ def random_problem(seed: int) -> FeedrateProblem:
     feed = np.repeat(rng.uniform(20.0, 200.0, points), 1 + rng.integers(0, 100, points))[:points]
     jump = (np.abs(d2_right - d2_left) / acceleration).max(axis=1)
     feed_sq_max = np.minimum(feed**2, 1.0 / np.maximum(jump, 1e-12))
-    room = np.minimum(feed_sq_max, 1.0 / (np.abs(d2_left) / acceleration).max(axis=1))
-    share = rng.uniform(0.0, 0.3, (2, len(counts))) * (seed % 2)
     return make_problem(
         s,
         d1,
@@ -122,8 +117,6 @@ def random_problem(seed: int) -> FeedrateProblem:
         acceleration=acceleration,
         piece=piece,
         margin=rng.uniform(0.0, 0.02, points),
-        feed_sq_start=share[0] * room[piece[:-1]],
-        feed_sq_end=share[1] * room[piece[1:] - 1],
     )
 
 
@@ -145,8 +138,6 @@ def reversed_problem(problem: FeedrateProblem) -> FeedrateProblem:
         feed_sq_max=problem.feed_sq_max[::-1],
         feed_sq_bound=problem.feed_sq_bound[::-1],
         margin=margin,
-        feed_sq_start=problem.feed_sq_end[::-1],
-        feed_sq_end=problem.feed_sq_start[::-1],
     )
 
 
@@ -164,6 +155,4 @@ def in_units(problem: FeedrateProblem, length: float, time: float = 1.0) -> Feed
         acceleration=problem.acceleration * (length / time**2),
         jerk=problem.jerk * (length / time**3),
         feed_sq_max=problem.feed_sq_max * feed_sq,
-        feed_sq_start=problem.feed_sq_start * feed_sq,
-        feed_sq_end=problem.feed_sq_end * feed_sq,
     )

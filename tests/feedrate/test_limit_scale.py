@@ -21,12 +21,6 @@ from planner.feedrate.toppra_adapter import ToppraSolver
 BY = 1.3
 
 
-def at_rest(seed: int) -> FeedrateProblem:
-    problem = random_problem(seed)
-    pieces = len(problem.piece) - 1
-    return dataclasses.replace(problem, feed_sq_start=np.zeros(pieces), feed_sq_end=np.zeros(pieces))
-
-
 def scaled(problem: FeedrateProblem, scale) -> FeedrateProblem:
     return dataclasses.replace(problem, limit_scale=scale)
 
@@ -51,8 +45,8 @@ def test_it_is_one_where_nothing_is_said_and_the_limits_are_those_of_the_machine
 @pytest.mark.parametrize(
     ("solver", "make", "rel"),
     [
-        (Reachability(), at_rest, 1e-9),
-        pytest.param(ToppraSolver(), at_rest, 1e-6, marks=needs_toppra),
+        (Reachability(), random_problem, 1e-9),
+        pytest.param(ToppraSolver(), random_problem, 1e-6, marks=needs_toppra),
         (JerkLimited(), small_problem, 2e-4),
         (JerkLimitedNLP(), small_problem, 1e-6),
         (SequentialConvex(), small_problem, 1e-5),
@@ -70,7 +64,7 @@ def test_the_same_scale_everywhere_slows_the_whole_motion(solver, make, rel):
 @pytest.mark.parametrize("seed", range(0, 12, 3))
 def test_at_second_order_it_is_a_stretched_path(seed):
     """|r' u + r'' x| <= a/lam^2 is |lam^2 r' u + lam^2 r'' x| <= a: the same rows, whichever way they are said."""
-    problem = at_rest(seed)
+    problem = random_problem(seed)
     scale = some_scale(problem)
     by = scale[:, None] ** 2
     same = dataclasses.replace(
@@ -90,7 +84,7 @@ def test_at_second_order_it_is_a_stretched_path(seed):
 @needs_toppra
 @pytest.mark.parametrize("seed", [0, 6])
 def test_at_second_order_both_solvers_take_the_same_time(seed):
-    problem = at_rest(seed)
+    problem = random_problem(seed)
     local = scaled(problem, some_scale(problem))
     own, other = Reachability().solve(local).require(), ToppraSolver().solve(local).require()
     assert other.cycle_time == pytest.approx(own.cycle_time, rel=1e-6)

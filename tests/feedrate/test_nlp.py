@@ -195,30 +195,6 @@ def test_too_few_iterations_is_a_status_without_numbers(bend, solver):
     assert solution.multipliers is None
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_speeds_that_only_jerk_forbids_are_not_solved(bend, solver):
-    """From rest to 70 mm/s is possible within 3 mm at 2000 mm/s2, but not with a hundredth of the jerk."""
-    problem = replace(line(3.0), feed_sq_end=np.array([70.0**2]), jerk=np.full(3, 2e3))
-    assert Reachability().solve(problem).solved
-    solution = JerkLimitedNLP(solver=solver).solve(problem)
-    assert solution.status in (Status.INFEASIBLE, Status.NUMERICAL_ERROR)
-    assert np.isnan(solution.feed_sq).all()
-    assert "piece 0" in solution.sentence
-
-
-def test_speeds_that_nothing_can_reach_are_infeasible(bend):
-    solution = JerkLimitedNLP().solve(replace(bend, feed_sq_end=np.array([1e6])))
-    assert solution.status is Status.INFEASIBLE
-    assert np.isnan(solution.feed_sq).all()
-
-
-def test_a_start_in_motion_is_kept():
-    problem = replace(line(3.0), feed_sq_start=np.array([20.0**2]))
-    solution = JerkLimitedNLP().solve(problem).require()
-    assert solution.feed_sq[0] == 400.0
-    assert solution.cycle_time < JerkLimitedNLP().solve(line(3.0)).cycle_time
-
-
 def test_a_guess_that_rests_at_both_ends_of_an_interval_is_no_hindrance():
     """The last interval of this problem is 1e-8 mm; the second-order optimum, the guess, stands still at both its ends."""
     problem = small_problem(8460)

@@ -42,12 +42,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "NaN in the path": ({"d1": np.full((3, 2), np.nan)}, "d1: nan at index"),
     "standing still": ({"s": [0.0, 1.0, 1.0]}, "1.0 mm at point 2 does not increase"),
     "backwards": ({"s": [0.0, 2.0, 1.0]}, "does not increase"),
-    "piece of one point": (
-        {"piece": [0, 2, 3], "feed_sq_start": [0.0] * 2, "feed_sq_end": [0.0] * 2},
-        "every piece needs at least two points",
-    ),
-    "negative start": ({"feed_sq_start": [-1.0]}, "ends of a piece must be >= 0"),
-    "negative end": ({"feed_sq_end": [-1.0]}, "ends of a piece must be >= 0"),
+    "piece of one point": ({"piece": [0, 2, 3]}, "every piece needs at least two points"),
     "margin of everything": ({"margin": [0.0, 1.0, 0.0]}, r"margin: every value must be in \[0, 1\)"),
     "negative margin": ({"margin": [0.0, -0.1, 0.0]}, "margin: every value must be in"),
     "wrong length": ({"margin": [0.0, 0.0]}, r"margin: shape \(2,\), expected \(3,\)"),
@@ -72,8 +67,7 @@ def test_a_problem_cannot_be_written() -> None:
 
 def test_pieces_share_an_arc_length() -> None:
     """At a full stop s may repeat: there is no interval between the two points."""
-    two = {"feed_sq_start": [0.0] * 2, "feed_sq_end": [0.0] * 2, "piece": [0, 2, 4]}
-    problem = dataclasses.replace(line(10.0, 4), s=[0.0, 1.0, 1.0, 2.0], **two)
+    problem = dataclasses.replace(line(10.0, 4), s=[0.0, 1.0, 1.0, 2.0], piece=[0, 2, 4])
     np.testing.assert_array_equal(problem.interval, [True, False, True, False])
 
 

@@ -15,16 +15,14 @@ from whole_plans import solve
 
 from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
-from planner.base.errors import NotSolvedError
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import (
     Interval,
     Reachability,
     axis_rows,
-    controllable_sets,
     largest_feed_sq,
 )
-from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
+from planner.feedrate.solution import FeedrateSolution, constraint_ratios
 
 JOBS = problems.all_jobs()
 RESOLVED = [seed for seed in range(40) if seed % 2 == 0]  # from rest to rest: always solvable
@@ -61,16 +59,6 @@ def test_switching_points_give_the_optimum() -> None:
         assert solve(program, problems.machine()).time == pytest.approx(exact, rel=1e-9)
 
 
-def test_circle_at_constant_normal_acceleration() -> None:
-    """Entered and left at F = sqrt(A R), a circle is run at F: T = 2 pi R / F."""
-    radius, limit = 5.0, 400.0
-    feed_sq = limit * radius
-    ends = {"feed_sq_start": [feed_sq], "feed_sq_end": [feed_sq]}
-    solution = plan(circle(radius, 2 * np.pi, 100, feed_sq_max=feed_sq, **ends))
-    np.testing.assert_allclose(solution.feed_sq, feed_sq, rtol=1e-12)
-    assert solution.cycle_time == pytest.approx(2 * np.pi * radius / np.sqrt(feed_sq), rel=1e-12)
-
-
 def test_circle_limited_by_its_axes() -> None:
     """Without another limit, x = a R wherever an axis stands across the path; between, the corner of the box allows up to sqrt2."""
     radius, limit = 5.0, 2000.0
@@ -101,7 +89,7 @@ def controllable_by_lp(problem: FeedrateProblem, i: int, target: float) -> float
 
 
 @pytest.mark.parametrize("seed", range(0, 30, 3))
-def test_controllable_sets_are_those_of_a_linear_programme(seed: int) -> None:
+def test_controllable_speeds_are_those_of_a_linear_programme(seed: int) -> None:
     problem = random_problem(seed)
     last = min(problem.piece[1] - 1, 25)
     target = min(0.1 * problem.feed_sq_max.max(), problem.feed_sq_max[last])
@@ -110,16 +98,6 @@ def test_controllable_sets_are_those_of_a_linear_programme(seed: int) -> None:
         h, share = problem.s[i + 1] - problem.s[i], 1.0 - problem.margin[i]
         target = largest_feed_sq(axis_rows(problem), Interval(i, h, share, target), problem.feed_sq_max[i])
         assert target == pytest.approx(expected, rel=1e-8)
-
-
-def test_controllable_sets_of_a_line_are_braking_distances() -> None:
-    """K = x_end + 2 a (L - s) below the feed; the profile follows it as soon as it gets there."""
-    problem = line(10.0, 101, feed_sq_max=900.0, acceleration=100.0, feed_sq_end=np.array([400.0]))
-    sets = controllable_sets(problem)
-    np.testing.assert_allclose(sets, np.minimum(900.0, 400.0 + 2.0 * 100.0 * (10.0 - problem.s)), rtol=1e-12)
-    assert (plan(problem).feed_sq <= sets * (1.0 + 1e-12)).all()
-    too_fast = dataclasses.replace(problem, feed_sq_end=np.array([1000.0]))
-    assert np.isnan(controllable_sets(too_fast)).all()
 
 
 def loosened(problem: FeedrateProblem) -> dict[str, FeedrateProblem]:
@@ -254,11 +232,3 @@ def test_rest_to_rest_in_one_interval_never_arrives() -> None:
     assert solution.cycle_time == np.inf
     ratio, _ = constraint_ratios(line(1.0, 2), solution)
     np.testing.assert_array_equal(ratio, 0.0)
-
-
-def test_unsolved_is_not_a_number_and_raises() -> None:
-    solution = Reachability().solve(line(1.0, 11, feed_sq_end=[5e3]))
-    assert solution.status is Status.INFEASIBLE
-    assert np.isnan(solution.cycle_time)
-    with pytest.raises(NotSolvedError, match="lower them or loosen the limits"):
-        solution.require()

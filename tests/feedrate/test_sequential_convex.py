@@ -257,11 +257,6 @@ def test_two_intervals_cannot_go_from_rest_to_rest() -> None:
     assert three.cycle_time > 0
 
 
-def test_ends_in_motion_are_refused() -> None:
-    with pytest.raises(ValueError, match="start and end at rest"):
-        SequentialConvex().solve(line(1.0, 11, feed_sq_end=np.array([100.0])))
-
-
 @pytest.mark.parametrize("settings", [{"tol": 0.0}, {"max_passes": 0}])
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(settings))):

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from oracles import needs_toppra
 from quick import slow_but
-from random_problems import circle, line, random_problem
+from random_problems import line, random_problem
 from whole_plans import solve
 
 from benchmarks.jobs import problems
 from planner.feedrate.constraints.problem import FeedrateProblem
-from planner.feedrate.reachability import Reachability, controllable_sets
+from planner.feedrate.reachability import Reachability
 from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
 from planner.feedrate.toppra_adapter import ToppraSolver
 from planner.nc.reader import read_program
@@ -60,24 +60,10 @@ def keeps_limits(problem: FeedrateProblem, solution: FeedrateSolution) -> None:
 @pytest.mark.shows(
     "solver-reachability, solver-toppra", "compared: with each other, on random problems and real programs"
 )
-@pytest.mark.parametrize("seed", slow_but([0, 3, 6, 9], range(0, 40, 3)))
-def test_controllable_sets(seed: int) -> None:
-    """Their upper ends; from rest to rest the lower ones are 0."""
-    problem = random_problem(seed)
-    own, other = controllable_sets(problem), ToppraSolver().controllable_sets(problem)
-    assert np.isfinite(own).all()
-    np.testing.assert_allclose(other[:, 1], own, rtol=1e-6, atol=1e-9 * own.max())
-    if not problem.feed_sq_end.any():
-        assert other[:, 0].max() <= 1e-9 * own.max()
-
-
-@pytest.mark.shows(
-    "solver-reachability, solver-toppra", "compared: with each other, on random problems and real programs"
-)
 @pytest.mark.parametrize("part", slow_but([0, 1], range(10)))
 def test_random_problems(part: int) -> None:
     solved = [both(random_problem(seed))[0].solved for seed in SEEDS if seed % 10 == part]
-    assert sum(solved) >= 18  # the others ask for speeds at their ends that cannot be joined
+    assert all(solved)
 
 
 @pytest.mark.parametrize("job", slow_but(("pentagon", "arcs"), problems.all_jobs()))
@@ -106,33 +92,6 @@ def test_real_programs(name: str, shared_dir: Path) -> None:
     both(solve(read_program(file, problems.machine()), problems.machine(), resolution=2e-2).problem)
 
 
-@pytest.mark.parametrize(
-    ("ends", "where"),
-    [
-        ({"feed_sq_end": [2e4]}, "above the feed limit at the end"),
-        ({"feed_sq_end": [5e3]}, "more than the length allows"),
-        ({"feed_sq_start": [5e3]}, "cannot stop in time"),
-        ({"feed_sq_start": [2e4]}, "above the feed limit at the start"),
-    ],
-)
-def test_ends_that_cannot_be_joined(ends: dict[str, list[float]], where: str) -> None:
-    own, other = both(line(1.0, 11, **ends))
-    for solution in (own, other):
-        assert solution.status is Status.INFEASIBLE, where
-        assert "piece 0" in solution.sentence
-        assert "lower them or loosen the limits" in solution.sentence
-        for array in (solution.feed_sq, solution.acc_s, solution.jerk_s, solution.duration):
-            assert np.isnan(array).all()
-
-
-def test_ends_within_reach() -> None:
-    """2 a L = 4000 mm2/s2 is the most that 1 mm gives."""
-    for share, solved in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
-        assert both(line(1.0, 11, feed_sq_end=[4000.0 * share]))[0].solved is solved
-    own, _ = both(circle(5.0, 2.0, 50, feed_sq_start=[100.0], feed_sq_end=[900.0]))
-    assert own.feed_sq[[0, -1]] == pytest.approx([100.0, 900.0])
-
-
 def test_toppra_gives_up_with_a_status(monkeypatch: pytest.MonkeyPatch) -> None:
     """A failure that toppra reports is a status with a remedy, whatever its arrays hold."""
     import toppra.algorithm as algorithm
@@ -150,6 +109,6 @@ def test_toppra_gives_up_with_a_status(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_silent(capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture) -> None:
     """toppra's own messages do not reach the user: the status says it all."""
-    ToppraSolver().solve(line(1.0, 11, feed_sq_start=[5e3]))
+    ToppraSolver().solve(line(1.0, 11))
     assert not caplog.records
     assert capfd.readouterr() == ("", "")

@@ -40,7 +40,6 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
         )
     grid = OnGrid(samples, machine, measured)
     caps, limits = _caps(grid), Limits.of(machine, grid.axes)
-    pieces = len(samples.piece) - 1
     problem = FeedrateProblem(
         axes=grid.axes,
         **{name: getattr(samples, name) for name in OF_SAMPLES},
@@ -50,8 +49,6 @@ def feedrate_problem(samples: PathSamples, machine: Machine, *, measured: bool =
         feed_sq_max=caps.feed_sq_max,
         feed_sq_bound=caps.which,
         bound_names=tuple(caps.names),
-        feed_sq_start=np.zeros(pieces),
-        feed_sq_end=np.zeros(pieces),
     )
     return with_user_limits(problem, samples, limits) if limits.along else problem
 

@@ -8,7 +8,7 @@ In x = feed^2 and u = acceleration along the path (dx/ds = 2 u), u constant on e
                | r'_k u_i + r''_k x | <= a_k (1 - margin_i)     at the left end (x = x_i, r'' to the right of the point)
                                                                 and the right end (x = x_{i+1}, r'' to its
                                                                 left), every axis k
-               x = feed_sq_start, feed_sq_end at the ends of each piece.
+               x = 0 at both ends of each piece.
 
 `margin` is the grid's interpolation error (feedrate/sampling/samples.py), so that the constraint holds in
 between as well. The jerk limits are carried along for solvers of third order; a second-order solver says that
@@ -60,7 +60,6 @@ class FeedrateProblem:
     feed_sq_bound         : (P,) index of that bound in `bound_names`
     bound_names           : names of the bounds on x ("feed", "velocity.x", "chord_error", ...)
     margin                : (P,) of the interval to the right, share of the acceleration limits [-]
-    feed_sq_start, feed_sq_end : (G,) x at both ends of each piece; 0 = rest
     limit_scale           : (P,) by what factor motions have to be slower around points [-]; 1 if not given
     own                   : how many of the axes, the last ones, are limits of one's own
                             (machine/user_limit.py): functions of the position with rows like an axis
@@ -88,8 +87,6 @@ class FeedrateProblem:
     feed_sq_bound: Array
     bound_names: tuple[str, ...]
     margin: FloatArray
-    feed_sq_start: FloatArray
-    feed_sq_end: FloatArray
     limit_scale: FloatArray = field(default_factory=lambda: np.ones(()))
     own: int = 0
     own_here: FloatArray | None = None
@@ -98,7 +95,6 @@ class FeedrateProblem:
     def __post_init__(self) -> None:
         points, axes = np.shape(self.d1)
         freeze(self, "piece", np.int64, (None,))
-        pieces = len(self.piece) - 1
         freeze(self, "s", np.float64, (points,))
         for name in ("d1", "d2_left", "d2_right", "d3_left", "d3_right"):
             freeze(self, name, np.float64, (points, axes))
@@ -112,8 +108,6 @@ class FeedrateProblem:
         if self.own:
             freeze(self, "own_here", np.float64, (2, points, self.own))
             freeze(self, "own_least", np.float64, (3, self.own), finite=False)
-        for name in ("feed_sq_start", "feed_sq_end"):
-            freeze(self, name, np.float64, (pieces,))
         self._check()
 
     def _check(self) -> None:
@@ -130,8 +124,6 @@ class FeedrateProblem:
             raise ValueError(f"FeedrateProblem.s: {self.s[bad + 1]} mm at point {bad + 1} does not increase")
         if (np.diff(self.piece) < 2).any():
             raise ValueError("FeedrateProblem.piece: every piece needs at least two points")
-        if (self.feed_sq_start < 0).any() or (self.feed_sq_end < 0).any():
-            raise ValueError("FeedrateProblem: feed_sq at the ends of a piece must be >= 0")
 
     def __len__(self) -> int:
         return len(self.s)
@@ -168,8 +160,6 @@ class FeedrateProblem:
         return replace(
             self,
             piece=np.concatenate([[0], np.cumsum(size)]),
-            feed_sq_start=self.feed_sq_start[pieces],
-            feed_sq_end=self.feed_sq_end[pieces],
             own_here=None if self.own_here is None else self.own_here[:, at],
             **{name: getattr(self, name)[at] for name in ("s", *ROWS)},
         )

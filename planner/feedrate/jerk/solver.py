@@ -65,13 +65,11 @@ class JerkLimited(WindowSettings):
     def solve(
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
     ) -> FeedrateSolution:
-        """Jerk-limited profile of all pieces; ends must be at rest. Failures are a status.
+        """Jerk-limited profile of all pieces, from rest to rest. Failures are a status.
 
         progress : called with the share of the points that is done
         """
         began = time.perf_counter()
-        if problem.feed_sq_start.any() or problem.feed_sq_end.any():
-            raise ValueError("JerkLimited: pieces must start and end at rest")
         short = np.flatnonzero(np.diff(problem.piece) <= INTERVALS_MIN)
         if len(short):
             at = problem.s[problem.piece[short[0]]]

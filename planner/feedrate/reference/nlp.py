@@ -11,9 +11,7 @@ trick:
     and at both ends of every interval (r', r'', r''' of that side; jerk of that interval), for every axis k
                | r'_k a + r''_k v^2 |                     <= a_k (1 - margin_i)
                | r'_k j + 3 r''_k v a + r'''_k v^3 |      <= j_k
-               v = sqrt(feed_sq_start), sqrt(feed_sq_end) at the ends; a = 0 where that is rest, free where it
-               is not (a piece that starts in motion continues something whose acceleration the problem does
-               not know).
+               v = a = 0 at the ends.
 
 The row v + a h/2 keeps the feed within its bounds between the points as well: v(t) is a parabola whose Bezier
 ordinates are v_i, v_i + a_i h_i/2 and v_{i+1}. Without it, coarse grids overshoot the programmed feed where
@@ -84,7 +82,7 @@ OUTCOMES = {
     ),
     "Infeasible_Problem_Detected": (
         Status.INFEASIBLE,
-        "no motion keeps all limits on this grid; refine it, or change the speeds asked for at the ends",
+        "no motion keeps all limits on this grid; refine it",
     ),
     "Maximum_Iterations_Exceeded": (
         Status.ITERATION_LIMIT,
@@ -116,7 +114,7 @@ class JerkLimitedNLP:
         self, problem: FeedrateProblem, progress: Callable[[float], None] | None = None
     ) -> FeedrateSolution:
         """Time-optimal jerk-limited profile with multipliers and prices; a failure of any piece is the status
-        of the whole. From rest to rest its kinematics are exact."""
+        of the whole. Its kinematics are exact."""
         began = time.perf_counter()
         most = POINTS_MAX[self.solver] if self.points_max is None else self.points_max
         if len(problem) > most:
@@ -127,8 +125,7 @@ class JerkLimitedNLP:
             return FeedrateSolution.failed(problem, guess.status, guess.sentence, repr(self), took)
         found = solve_pieces(problem, lambda g: _solve_piece(problem, g, guess, self), progress)
         solution = solution_of(problem, found, repr(self), began)
-        at_rest = not (problem.feed_sq_start.any() or problem.feed_sq_end.any())
-        return polished(problem, solution) if solution.solved and at_rest else solution
+        return polished(problem, solution) if solution.solved else solution
 
 
 def _solve_piece(
@@ -144,8 +141,7 @@ def _solve_piece(
     ds = np.diff(problem.s[here])
     intervals, axes = len(ds), len(problem.axes)
     points = intervals + 1
-    v_start, v_end = np.sqrt(problem.feed_sq_start[g]), np.sqrt(problem.feed_sq_end[g])
-    if v_start == 0.0 and v_end == 0.0 and intervals < INTERVALS_MIN:
+    if intervals < INTERVALS_MIN:
         return too_few(intervals)
 
     # ---- scaling: units in which the mean interval and its guessed duration are 1
@@ -190,10 +186,7 @@ def _solve_piece(
     lower[:, 4] = 0.0
 
     # ---- boundary
-    for end, v_there in ((0, v_start), (-1, v_end)):
-        lower[end, 0] = upper[end, 0] = v_there / speed
-        if v_there == 0.0:
-            lower[end, 1] = upper[end, 1] = 0.0
+    lower[[0, -1], :2] = upper[[0, -1], :2] = 0.0
     lower[0, 2] = upper[0, 2] = 0.0  # nothing to the left of the first point
 
     # ---- initial guess: the second-order optimum, slower; its acceleration made continuous
@@ -229,7 +222,7 @@ def _solve_piece(
     v, h = found[:, 0], found[:, 4]
     profile = found[:, [0, 1, 3, 4]] * [speed, acc, jerk, second]
     profile[:, 0] = np.clip(profile[:, 0], 0.0, feed_max)
-    profile[[0, -1], 0] = v_start, v_end
+    profile[[0, -1], 0] = 0.0
 
     # ---- multipliers, in time [s]: gaps of v, a, j_left; length; feed between the points; then right and
     # left of the point ------

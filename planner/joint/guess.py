@@ -15,7 +15,7 @@ and each of them has its place on the run, the nearest one, never going back.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,32 +47,6 @@ class Cut(NamedTuple):
 DEFAULT_CUT = Cut()
 
 
-class CutMotion(Protocol):
-    """A motion cut into steps: what is read of a `Guess` and of what becomes of it."""
-
-    @property
-    def leg(self) -> Array:
-        """(N,) leg of each step."""
-        ...
-
-    @property
-    def h(self) -> FloatArray:
-        """(N,) duration [s]."""
-        ...
-
-    @property
-    def state(self) -> FloatArray:
-        """(N+1, 3, A) position, velocity, acceleration at the nodes [mm, s]."""
-        ...
-
-    @property
-    def place(self) -> FloatArray:
-        """(N, 4) places of the control points along the run [mm]."""
-        ...
-
-    def __len__(self) -> int: ...
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guess:
     """N steps along a run, the N+1 nodes around them, A axes."""
@@ -97,6 +71,17 @@ class Guess:
     def slower(self, by: float) -> Guess:
         """The same path in `by` times the time."""
         return replace(self, h=self.h * by, state=self.state / by ** np.arange(3)[:, None])
+
+
+class CutMotion:
+    """The steps of a guess while they are searched: its arrays, that windows write into, each its own steps."""
+
+    def __init__(self, guess: Guess):
+        self.leg, self.h = guess.leg, guess.h.copy()
+        self.state, self.place = guess.state.copy(), guess.place.copy()
+
+    def __len__(self) -> int:
+        return len(self.h)
 
 
 def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut = DEFAULT_CUT) -> Guess:

@@ -35,7 +35,7 @@ def tightened(over: FloatArray, number: int) -> FloatArray:
     return np.maximum(more, 1.0 + LOWERED * (above > 1.0).any(axis=0)) if number >= EVERYWHERE else more
 
 
-def law_shares(run: TubeRun, cut: CutMotion, node: Array) -> FloatArray:
+def law_shares(run: TubeRun, cut: CutMotion | Guess, node: Array) -> FloatArray:
     """(n, M) shares that a cut motion uses at nodes `node` (n,) of the laws that do not depend on its jerk, which is free
     there; 0 of the others."""
     if not len(run.laws):

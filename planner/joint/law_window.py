@@ -21,7 +21,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.joint import laws as rows
-from planner.joint.guess import CutMotion
+from planner.joint.guess import CutMotion, Guess
 from planner.joint.laws import LawRows
 from planner.joint.own_laws import JOINT, RunLaws, Where, motion_at
 
@@ -36,7 +36,7 @@ FAR = 1e6  # of a mean step's speed, acceleration and so on: instead of no bound
 SMALLEST = np.finfo(np.float64).tiny
 
 
-class Window:
+class Window(CutMotion):
     """The steps of a window, and those beside it, of a cut motion (guess.py), as a copy.
 
     leg, h, state, place : as of that; of the steps beside it, which may be found meanwhile, only the legs are
@@ -44,15 +44,12 @@ class Window:
     lo, hi               : the steps of the window are lo .. hi - 1 of these
     """
 
-    def __init__(self, cut: CutMotion, lo: int, hi: int):
+    def __init__(self, cut: CutMotion | Guess, lo: int, hi: int):
         begin, end = max(lo - 1, 0), min(hi + 1, len(cut))
         self.leg, self.h = cut.leg[begin:end], cut.h[begin:end].copy()
         self.state, self.place = cut.state[begin : end + 1].copy(), cut.place[begin:end].copy()
         self.lo, self.hi = lo - begin, hi - begin
         self.h[: self.lo] = self.h[self.hi :] = 0.0
-
-    def __len__(self) -> int:
-        return len(self.h)
 
     def seen(self, step: Array, t: FloatArray) -> tuple[Where, FloatArray]:
         """Where steps `step` (n,) are at the times t (n,) after their beginning, and their motion (n, 4, A)."""

@@ -23,7 +23,7 @@ from planner.base.sizes import SIZES
 from planner.feedrate.solution import Status
 from planner.joint.checks import Keeps, worst_shares
 from planner.joint.groups import Search, Sweep, Task, searched
-from planner.joint.guess import Guess, unit_of
+from planner.joint.guess import CutMotion, Guess, unit_of
 from planner.joint.interior_point import Tuning
 from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, lost, strain, tightened
 from planner.joint.law_window import NEAR, Window, near
@@ -123,23 +123,11 @@ class TubeOwn:
         )
 
 
-class _Cut:
-    """The steps of a guess (guess.py) while they are searched: arrays that windows write into, each its own
-    steps."""
-
-    def __init__(self, guess: Guess):
-        self.leg, self.h = guess.leg, guess.h.copy()
-        self.state, self.place = guess.state.copy(), guess.place.copy()
-
-    def __len__(self) -> int:
-        return len(self.h)
-
-
 class _Search:
     """A run on its way from a guess to the optimum near it."""
 
     def __init__(self, settings: TubeOwn, run: TubeRun, guess: Guess):
-        self.settings, self.run, self.guess = settings, run, _Cut(guess)
+        self.settings, self.run, self.guess = settings, run, CutMotion(guess)
         self.jerk = np.diff(guess.state[:, 2], axis=0) / guess.h[:, None]
         self.kept = np.ones(len(guess), dtype=bool)
         self.price = np.zeros((len(guess), columns(run)))

@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.joint import row_kinds as rows
-from planner.joint.guess import CutMotion
+from planner.joint.guess import CutMotion, Guess
 from planner.joint.law_window import Units, Window, law_rows, near
 from planner.joint.laws import LawRows
 from planner.joint.legs import LegFormulas
@@ -47,7 +47,7 @@ class StepWindow(NamedTuple):
 
 def window_of(
     run: TubeRun,
-    guess: CutMotion,
+    guess: CutMotion | Guess,
     lo: int,
     hi: int,
     missed: float,

@@ -10,15 +10,12 @@ acceleration itself be within the limit, too, so that setpoints across it show n
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.limit import Cap, RowLimit, RowPoint, by_axis, over
-
-if TYPE_CHECKING:
-    from planner.feedrate.constraints.on_grid import OnGrid
+from planner.feedrate.constraints.on_grid import OnGrid
 
 JUMP = "curvature_jump"  # the name of the cap, with the axis behind it
 

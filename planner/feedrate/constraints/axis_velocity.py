@@ -6,15 +6,12 @@ Between the points r' turns; the share of the interval's `margin` (samples.py) m
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.limit import AxisLimit, Cap, by_axis
-
-if TYPE_CHECKING:
-    from planner.feedrate.constraints.on_grid import OnGrid
+from planner.feedrate.constraints.on_grid import OnGrid
 
 
 def feed_sq_max(d1: FloatArray, limits: FloatArray) -> tuple[FloatArray, Array]:

@@ -13,15 +13,12 @@ eps_ch is the chord's part of the error budget (on_grid.py).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from planner.base.arrays import FloatArray
 from planner.corners.budget import chord_rate
 from planner.feedrate.constraints.limit import Cap, Limit, over
+from planner.feedrate.constraints.on_grid import Side
 from planner.machine import Machine
-
-if TYPE_CHECKING:
-    from planner.feedrate.constraints.on_grid import Side
 
 
 def feed_sq_max(kappa: FloatArray, tol: FloatArray, rate: float) -> FloatArray:

@@ -9,14 +9,11 @@ measured (planning/optimal/behind_filters.py), and what is found makes a cap of 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.limit import Cap, Limit, over
+from planner.feedrate.constraints.on_grid import Side
 from planner.machine import Machine
-
-if TYPE_CHECKING:
-    from planner.feedrate.constraints.on_grid import Side
 
 
 def feed_sq_max(

@@ -17,16 +17,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.feedrate.constraints.on_grid import OnGrid, Side
 from planner.machine import Machine
 from planner.machine.user_limit import OwnLimit
-
-if TYPE_CHECKING:
-    from planner.feedrate.constraints.on_grid import OnGrid, Side
 
 
 class Cap(NamedTuple):

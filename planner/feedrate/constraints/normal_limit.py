@@ -9,15 +9,12 @@ judge has code of its own for it (verifier/limits.py).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from planner.base.arrays import FloatArray
 from planner.corners.budget import NORMAL
 from planner.feedrate.constraints.limit import Cap, Limit, over
+from planner.feedrate.constraints.on_grid import Side
 from planner.machine import Machine
-
-if TYPE_CHECKING:
-    from planner.feedrate.constraints.on_grid import Side
 
 NAME = NORMAL
 

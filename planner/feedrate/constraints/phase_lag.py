@@ -8,15 +8,12 @@ The machine file names phi, or none (`Fir.phase_lag_max`). The judge does not lo
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from planner.base.arrays import FloatArray
 from planner.base.units import RAD_PER_DEG
 from planner.feedrate.constraints.limit import Cap, Limit, over
+from planner.feedrate.constraints.on_grid import Side
 from planner.machine import Machine
-
-if TYPE_CHECKING:
-    from planner.feedrate.constraints.on_grid import Side
 
 
 def feed_sq_max(kappa: FloatArray, angle: float, time_constants: Sequence[FloatArray | float]) -> FloatArray:

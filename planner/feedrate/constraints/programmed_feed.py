@@ -8,16 +8,13 @@ than on the block, and F holds there too.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.limit import Cap, Limit
+from planner.feedrate.constraints.on_grid import OnGrid
 from planner.machine import LINEAR_AXES
-
-if TYPE_CHECKING:
-    from planner.feedrate.constraints.on_grid import OnGrid
 
 
 def feed_sq_max(feed: FloatArray) -> FloatArray:

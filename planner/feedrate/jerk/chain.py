@@ -4,7 +4,6 @@ See solver.py.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -40,24 +39,8 @@ DIVISION = 5
 INTERVALS_MIN = 4  # from rest to rest: the plain start needs as many
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Task:
-    """The points first..last of a problem, to be solved from rest to rest.
-
-    profile : of all points of the problem; these points are written
-    tell    : called with the number of points that are new; may end the work by an exception
-    """
-
-    solver: WindowSettings
-    columns: ProblemColumns
-    profile: Window
-    first: int
-    last: int
-    tell: Callable[[int], None]
-
-
 class Chain:
-    """The profile of a task as it grows, window by window, from its first point.
+    """The profile of the points first..last of a problem, from rest to rest, as it grows, window by window.
 
     at         : up to which point there is a profile
     rest       : what the last window knows of the way ahead, down to its stop
@@ -66,15 +49,27 @@ class Chain:
     slower     : by what factor all of it was slowed down to keep every limit at the grid points
     """
 
-    def __init__(self, task: Task):
-        self.solver, self.columns, self.profile = task.solver, task.columns, task.profile
-        self.at, self.first, self.last = task.first, task.first, task.last
+    def __init__(
+        self,
+        first: int,
+        last: int,
+        *,
+        solver: WindowSettings,
+        columns: ProblemColumns,
+        profile: Window,
+        tell: Callable[[int], None],
+    ):
+        """profile : of all points of the problem; these points are written
+        tell       : called with the number of points that are new; may end the work by an exception
+        """
+        self.solver, self.columns, self.profile = solver, columns, profile
+        self.at, self.first, self.last = first, first, last
         self.rest: Window | None = None
         self.stops: list[int] = []
         self.iterations, self.slower = 0, 1.0
         # windows solved; how often not from the first start, and divided into smaller ones
         self.windows = self.other_starts = self.divided = 0
-        self._tell = task.tell
+        self._tell = tell
         self._room = Room()
 
     @property

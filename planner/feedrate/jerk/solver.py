@@ -47,7 +47,7 @@ import numpy as np
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.feedrate.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk.chain import INTERVALS_MIN, Chain, Task
+from planner.feedrate.jerk.chain import INTERVALS_MIN, Chain
 from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.settings import WindowSettings
@@ -77,8 +77,8 @@ class JerkLimited(WindowSettings):
             return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
         profile = Window.at_rest(*problem.d1.shape)
         columns, counted = columns_of(problem), _Counted(len(problem), progress)
-        task = partial(Task, solver=self, columns=columns, profile=profile, tell=counted.add)
-        pieces = [Chain(task(first=a, last=b - 1)) for a, b in pairwise(problem.piece.tolist())]
+        chain = partial(Chain, solver=self, columns=columns, profile=profile, tell=counted.add)
+        pieces = [chain(a, b - 1) for a, b in pairwise(problem.piece.tolist())]
         _solve(pieces, counted)
         stops = [stop for piece in pieces for stop in piece.stops]
         slower = max(piece.slower for piece in pieces)

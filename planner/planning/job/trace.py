@@ -13,7 +13,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 Fact = int | float | str | bool
 
@@ -50,18 +50,8 @@ class Step:
 Log = Callable[[Step], None]
 
 
-class Tell(Protocol):
-    """How a stage tells of a step; the arguments are the fields of `Step`."""
-
-    def __call__(
-        self,
-        name: str,
-        *,
-        found: float | None = None,
-        before: float | None = None,
-        kept: bool | None = None,
-        **facts: Fact,
-    ) -> None: ...
+# How a stage tells of a step: the name, then the other fields of `Step` by name, and facts.
+Tell = Callable[..., None]
 
 
 def tell_nobody(name: str, **told: Any) -> None:

@@ -7,12 +7,12 @@ same way; this method has the reference solvers.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from planner.base.errors import InputError
 from planner.base.names import QUICK
-from planner.feedrate.solution import Status
 from planner.joint.groups import searched
 from planner.joint.parts import FoundRun, parts_of
 from planner.joint.run import TubeRun, tube_runs_of
@@ -20,7 +20,7 @@ from planner.joint.solvers import TubeSolver, tube_solver
 from planner.joint.splice import Spliced
 from planner.nc.program import Program
 from planner.planning.job.job import Job
-from planner.planning.job.made import NO_TABLES, Delivered, Tables
+from planner.planning.job.made import Delivered
 from planner.planning.job.plan import Plan
 from planner.planning.joint_search import OF_THE_START, said, search_run, tabled
 from planner.planning.joint_start import Start
@@ -50,8 +50,10 @@ class TubeMethod(Method):
             _check_size(runs, job.program, solver)
         with job.stage("start"):
             first = within_tolerance(job.with_own_clock(), self.start)
+        plan = partial(job.plan, method="tube", corner=None, solver=repr(self.solver))
         if first.making is None:
-            return self._plan(job, None, first.status, f"no motion to start from: {first.sentence}", 0)
+            sentence = f"no motion to start from: {first.sentence}"
+            return plan(None, status=first.status, sentence=sentence, grid_points=0)
         start, found = Start(first.making.motion, job), list[FoundRun]()
         with job.stage("solve") as report:
             for k, run in enumerate(runs):
@@ -66,29 +68,8 @@ class TubeMethod(Method):
         if tables.prices is None and (first.prices is not None or first.making.priced is not None):
             tables = replace(tables, prices=first.prices, priced=first.making.priced)
             notes = (OF_THE_START,)
-        return self._plan(job, made, status, sentence, grid_points, tables, notes)
-
-    def _plan(
-        self,
-        job: Job,
-        made: Delivered | None,
-        status: Status,
-        sentence: str,
-        grid_points: int,
-        tables: Tables = NO_TABLES,
-        notes: tuple[str, ...] = (),
-    ) -> Plan:
-        """The plan of this method with what was delivered."""
-        return job.plan(
-            made,
-            method="tube",
-            corner=None,
-            solver=repr(self.solver),
-            status=status,
-            sentence=sentence,
-            grid_points=grid_points,
-            tables=tables,
-            notes=notes,
+        return plan(
+            made, status=status, sentence=sentence, grid_points=grid_points, tables=tables, notes=notes
         )
 
 

@@ -31,7 +31,7 @@ import planner
 from benchmarks.controls.control_planners import KlipperPath, buffered
 from benchmarks.record import markdown, write_results
 from planner.controls.timing import times
-from planner.controls.timing.models import CONTROLS, predicted_time
+from planner.controls.timing.models import CONTROLS, predicted_times
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine, load_machine
 from planner.nc.points import own_text
@@ -80,7 +80,7 @@ def row_of(file: Path, program: Program, machine: Machine, peers: Path, klippy: 
             in_force = times.feed_in_force(program, text)[toolpath.block[segment]]
             feed = np.where(toolpath.rapid[segment], in_force, feed)
         stop = times.standing(program, toolpath.block[segment], switches=name != "klipper")
-        predicted = predicted_time(points, feed, stop, machine, axes, control)
+        predicted = float(predicted_times(points, feed, stop, machine, axes, control).sum())
         if name == "klipper":
             most = {
                 "max_velocity": 100.0,

@@ -172,7 +172,7 @@ def _of_control(
 
     try:
         found = job.own(SHARE * TOLERANCE)
-        found += job.chords(SHARE * job.room, "chords") if job.room else []
+        found += job.chords(SHARE * job.room) if job.room else []
     except InputError as fault:
         return [refused(fault)]
     for one in found:
@@ -189,7 +189,7 @@ def _of_control(
 def _outcome(one: Candidate) -> str:
     if one.replaced is None:
         return "as it is"
-    return "chords" if one.name == "chords" else "own path"
+    return "own path" if one.name == OWN_PATH else "chords"
 
 
 def of_file_within(file: Path, machine: Machine, seconds: float) -> list[Row]:

@@ -28,7 +28,7 @@ from planner.base.errors import NotSolvedError
 from planner.base.names import NORMAL
 from planner.controls.export.chords import Polyline, programmed_polyline
 from planner.controls.timing import models
-from planner.controls.timing.linuxcnc import linuxcnc_time
+from planner.controls.timing.linuxcnc import linuxcnc_times
 from planner.controls.timing.times import standing
 from planner.feedrate.solvers import ThirdOrderSolver
 from planner.machine import Machine
@@ -157,15 +157,9 @@ def modelled(control: str) -> Callable[[Program, Machine, float | None], float]:
 
 def _law(stops: Plan, line: Polyline, control: str) -> float:
     feed = np.where(line.rapid, np.inf, line.feed)
-    law = models.CONTROLS[control]
-    return models.predicted_time(
-        line.points,
-        feed,
-        standing(stops.program, line.block, switches=True),
-        stops.machine,
-        stops.toolpath.axes,
-        law,
-    )
+    law, stands = models.CONTROLS[control], standing(stops.program, line.block, switches=True)
+    times = models.predicted_times(line.points, feed, stands, stops.machine, stops.toolpath.axes, law)
+    return float(times.sum())
 
 
 def _linuxcnc(stops: Plan, line: Polyline, tolerance: float) -> float:
@@ -173,6 +167,6 @@ def _linuxcnc(stops: Plan, line: Polyline, tolerance: float) -> float:
     moves = np.linalg.norm(np.diff(line.points, axis=0), axis=1) > 0.0
     at = np.append(0, np.flatnonzero(moves) + 1)  # a point that moves on, after those that stand in its place
     stands = np.logical_or.reduceat(standing(stops.program, line.block, switches=True), at)
-    return linuxcnc_time(
-        line.points[at], feed[moves], stands, stops.machine, stops.toolpath.axes, tolerance - line.miss
-    )
+    room = tolerance - line.miss
+    times = linuxcnc_times(line.points[at], feed[moves], stands, stops.machine, stops.toolpath.axes, room)
+    return float(times.sum())

@@ -42,7 +42,7 @@ from planner.controls.export.output import head_of
 from planner.controls.export.rows import Row, Source
 from planner.controls.export.source import source_of, text_of, why_not
 from planner.controls.export.translate import Translator
-from planner.controls.timing.linuxcnc import joined_moves, linuxcnc_time
+from planner.controls.timing.linuxcnc import joined_moves, linuxcnc_times
 from planner.controls.timing.times import standing
 from planner.machine import Machine
 from planner.planning.job.plan import Plan
@@ -63,10 +63,6 @@ class Candidate:
     replaced: Array | None  # (R,) the rows that chords replace; None for the program as it is
     mode: str = ""  # LinuxCNC's G64, or ""
     time: float = np.nan  # predicted [s]
-
-    def at(self, time: float) -> Candidate:
-        """The candidate with its predicted time [s]."""
-        return dataclasses.replace(self, time=time)
 
 
 class Candidates:
@@ -119,7 +115,7 @@ class Candidates:
             return [Candidate(name=AS_IT_IS, line=line, replaced=None)]
         return [Candidate(name=OWN_PATH, line=line, replaced=self._replaced(planned=False))]
 
-    def chords(self, within: float, name: str) -> list[Candidate]:
+    def chords(self, within: float) -> list[Candidate]:
         """The planned path with chords that miss it by so much at most [mm], if any line can be replaced."""
         replaced = self._replaced(planned=True)
         rows = self.source.rows
@@ -130,23 +126,21 @@ class Candidates:
         line = spliced(planned, programmed_polyline(self.plan, within), self.source.program, parts)
         if off_the_path(line, self.plan, parts) > self.tolerance:
             return []
+        name = f"planned path, chords within {within / MICROMETRE:.3g} µm"
         return [Candidate(name=name, line=line, replaced=replaced)]
 
     def _replaced(self, *, planned: bool) -> Array:
         """(R,) the rows whose moves are written as chords: all that can be, or those for which the control
         has no words."""
-        return np.array(
-            [row.plain and self._is_replaced(row, planned=planned) for row in self.source.rows], dtype=bool
-        )
+        control, reading = self.control, self.source.program.reading
 
-    def _is_replaced(self, row: Row, *, planned: bool) -> bool:
-        control = self.control
-        if row.radius:  # which the control would reckon with once more
-            return not control.cycles
-        own = row.value("E") is not None  # an extruder's moves stay, where the control knows them
-        return (planned and row.motion <= 30 and not own) or not takes_move(
-            row, control, self.source.program.reading
-        )
+        def is_replaced(row: Row) -> bool:
+            if row.radius:  # which the control would reckon with once more
+                return not control.cycles
+            own = row.value("E") is not None  # an extruder's moves stay, where the control knows them
+            return (planned and row.motion <= 30 and not own) or not takes_move(row, control, reading)
+
+        return np.array([row.plain and is_replaced(row) for row in self.source.rows], dtype=bool)
 
     def written(self, chosen: Candidate) -> tuple[bytes, tuple[str, ...]]:
         """The file of a candidate, and notes on it. Raises InputError for a line that the control has no
@@ -154,40 +148,36 @@ class Candidates:
         if chosen.replaced is None:
             assert self.text is not None
             return with_mode(self.text, chosen.mode), ()
-        rapid = _rapid_speed(chosen.line, self.plan.machine, self.plan.toolpath.axes)
-        found = Translator(
-            self.source, self.control, self.plan.machine, chosen.replaced, chosen.line, rapid
-        ).translated()
+        machine = self.plan.machine
+        rapid = _rapid_speed(chosen.line, machine, self.plan.toolpath.axes)
+        writer = Translator(self.source, self.control, machine, chosen.replaced, chosen.line, rapid)
+        lines, notes = writer.translated()
         head = head_of(self.source, self.control, self.plan, self.tolerance, chosen.name)
-        lines = [*head, *([chosen.mode] if chosen.mode else []), *found.lines]
-        text = "\n".join([*lines, ""]).encode("ascii", "replace")
-        return text, found.notes
+        return "\n".join([*head, *[chosen.mode] * bool(chosen.mode), *lines, ""]).encode(
+            "ascii", "replace"
+        ), notes
 
     def room_notes(self) -> tuple[str, ...]:
         """That the plan leaves no room for chords, or little."""
         if self.room is not None and self.room > LITTLE * self.tolerance:
             return ()
         tolerance, less = self.tolerance, LESS * self.tolerance
-        uses = f"the plan uses {self.used / MICROMETRE:.3f} of {tolerance / MICROMETRE:g} µm"
+        uses = f"the plan uses {self.used / MICROMETRE:.3f} of {tolerance / MICROMETRE:g} µm, which leaves"
         if self.room is None:
-            return (
-                f"{uses}, which leaves no room for chords: plan with --tolerance {less:.4g}, and export with "
-                f"--tolerance {tolerance:g}",
-            )
-        return (
-            f"{uses}, which leaves little room for chords: a plan with --tolerance {less:.4g}, exported with "
-            f"--tolerance {tolerance:g}, may be faster on the control",
-        )
+            said = f"no room for chords: plan with --tolerance {less:.4g}, and export with --tolerance {tolerance:g}"
+        else:
+            said = f"little room for chords: a plan with --tolerance {less:.4g}, exported with --tolerance {tolerance:g}, "
+            said += "may be faster on the control"
+        return (f"{uses} {said}",)
 
 
 def with_mode(text: bytes, mode: str) -> bytes:
     """A program's text with its path mode on a line of its own, after the percent sign if it begins with
     one."""
-    if not mode:
-        return text
     head = re.match(rb"\s*%[^\n]*\n", text)
     cut = head.end() if head else 0
-    return text[:cut] + b"G21 " + mode.encode("ascii") + b"\n" + text[cut:]
+    line = b"G21 %b\n" % mode.encode("ascii") if mode else b""
+    return text[:cut] + line + text[cut:]
 
 
 def _rapid_speed(line: Polyline, machine: Machine, axes: tuple[str, ...]) -> FloatArray:
@@ -212,27 +202,17 @@ def linuxcnc_candidates(job: Candidates) -> list[Candidate]:
     (own,) = job.own(OWN_CHORDS * tolerance)
     if job.text is not None and PATH_MODE.search(job.text):
         return [dataclasses.replace(own, name=f"{own.name}, with its own path mode")]
-    found = []
-    for name, p, q in (
-        (own.name, tolerance, 0.0),
-        (f"{own.name}, short moves joined", 0.5 * tolerance, 0.5 * tolerance),
-    ):
-        chords = (
-            0.0
-            if own.replaced is None or not own.replaced.any() or own.line.miss == 0.0
-            else OWN_CHORDS * tolerance
-        )
-        p -= chords
-        one = dataclasses.replace(own, name=name, mode=_mode(p, q))
-        found.append(one.at(_time(job, own.line, p, q)))
+    exact = own.replaced is None or not own.replaced.any() or own.line.miss == 0.0
+    chords = 0.0 if exact else OWN_CHORDS * tolerance
+    joined = dataclasses.replace(own, name=f"{own.name}, short moves joined")
+    found = [
+        _timed(job, own, tolerance - chords),
+        _timed(job, joined, 0.5 * tolerance - chords, 0.5 * tolerance),
+    ]
     for share in SHARES:
-        if share * room < FINEST or (1.0 - share) * room < ROUND_MIN:
-            continue
         p = (1.0 - share) * room
-        for one in job.chords(
-            share * room, f"planned path, chords within {share * room / MICROMETRE:.3g} µm"
-        ):
-            found.append(dataclasses.replace(one, mode=_mode(p, 0.0)).at(_time(job, one.line, p, 0.0)))
+        if share * room >= FINEST and p >= ROUND_MIN:
+            found += [_timed(job, one, p) for one in job.chords(share * room)]
     return found
 
 
@@ -244,17 +224,13 @@ def best_first(found: list[Candidate]) -> list[Candidate]:
     return [first, *(one for one in found if one is not first)]
 
 
-def _mode(p: float, q: float) -> str:
-    return "G64 P{:.4f} Q{:.4f}".format(*(np.floor(value * 1e4 + 1e-6) / 1e4 for value in (p, q)))
-
-
-def _time(job: Candidates, line: Polyline, p: float, q: float) -> float:
-    """Predicted time, dwells included [s]."""
-    plan = job.plan
+def _timed(job: Candidates, one: Candidate, p: float, q: float = 0.0) -> Candidate:
+    """A candidate with G64 P and Q [mm], and its predicted time, dwells included."""
+    plan, line = job.plan, one.line
     stands = standing(plan.program, line.block, switches=True)
     feed: FloatArray = np.where(line.rapid, np.inf, line.feed)
     kept = joined_moves(line.points, feed, line.rapid, stands, q)
-    moving = linuxcnc_time(
-        line.points[kept], feed[kept[:-1]], stands[kept], plan.machine, plan.toolpath.axes, p
-    )
-    return moving + float(plan.toolpath.dwell.sum())
+    moves = line.points[kept], feed[kept[:-1]], stands[kept]
+    moving = linuxcnc_times(*moves, plan.machine, plan.toolpath.axes, p)
+    mode = "G64 P{:.4f} Q{:.4f}".format(*(np.floor(value * 1e4 + 1e-6) / 1e4 for value in (p, q)))
+    return dataclasses.replace(one, mode=mode, time=float(moving.sum()) + float(plan.toolpath.dwell.sum()))

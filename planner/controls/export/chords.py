@@ -161,13 +161,8 @@ def breaks(rows: list[Row], replaced: Array) -> Array:
     """
     found: set[int] = set()
     for row, chords in zip(rows, replaced.tolist(), strict=True):
-        if (
-            not chords
-            or row.others
-            or row.feeds
-            or any(word.letter in "SMT" for word in row.words)
-            or row.motion > 30
-        ):
+        switches = any(word.letter in "SMT" for word in row.words)
+        if not chords or row.others or row.feeds or switches or row.motion > 30:
             found |= {row.first, row.last}
     return np.array(sorted(found), dtype=np.int64)
 
@@ -237,10 +232,8 @@ def _vertices(trajectory: Trajectory, fixed: Array, within: float) -> tuple[Arra
         off = _misses(trajectory.position, begin, end)
         divided = (off > within) & (end - begin > 1)
         miss = max(miss, float(off[~divided].max(initial=0.0)))
-        begin, end = begin[divided], end[divided]
-        parts = np.minimum(np.maximum(np.ceil(np.sqrt(off[divided] / within)), 2), end - begin).astype(
-            np.int64
-        )
+        begin, end, off = begin[divided], end[divided], off[divided]
+        parts = np.minimum(np.maximum(np.ceil(np.sqrt(off / within)), 2), end - begin).astype(np.int64)
         of = np.repeat(np.arange(len(begin)), parts - 1)
         number = np.arange(len(of)) - np.repeat(np.cumsum(parts - 1) - parts + 1, parts - 1) + 1
         target = along[begin[of]] + (along[end[of]] - along[begin[of]]) * number / parts[of]

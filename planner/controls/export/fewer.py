@@ -53,30 +53,19 @@ def fewer_lines(
     Raises InputError for a program that computes, of another language than G-code, of points or plotters, and
     with the tool centre point on; and where no line can go.
     """
-    why = _why_not(program)
-    if why:
-        raise InputError(f"the program cannot be written with fewer lines: {why}", source=program.source)
-    writer = _Writer(data, program, machine, within, arcs=arcs)
-    found = writer.written()
-    if found.after == found.before:
-        said = "; ".join(f"{why}: {count:,} lines, first {line}" for why, (count, line) in found.kept.items())
-        raise InputError(
-            f"no line can go within {plain(round(within, 6))} mm{': ' * bool(said)}{said}",
-            source=program.source,
-        )
-    return found
-
-
-def _why_not(program: Program) -> str:
-    """Why a program as a whole stays as it is; "" if it need not."""
     for holds, why in (
         (program.pen, "it is a plotter file"),
         (program.expansion is not None, _COMPUTES),
         (program.tool_point is not None, "the tool centre point is on, and its lines are of the tip"),
     ):
         if holds:
-            return why
-    return ""
+            raise InputError(f"the program cannot be written with fewer lines: {why}", source=program.source)
+    found = _Writer(data, program, machine, within, arcs=arcs).written()
+    if found.after == found.before:
+        said = "; ".join(f"{why}: {count:,} lines, first {line}" for why, (count, line) in found.kept.items())
+        text = f"no line can go within {plain(round(within, 6))} mm{': ' * bool(said)}{said}"
+        raise InputError(text, source=program.source)
+    return found
 
 
 class _Writer:
@@ -151,13 +140,12 @@ class _Writer:
     def _replace(self, run: list[Row]) -> tuple[int, int]:
         """Write a run anew; returns the numbers of its moves and of its arcs."""
         first = run[0]
-        unit = MM_PER_INCH if first.inch else 1.0
-        digits = INCH_DECIMALS if first.inch else DECIMALS
-        offset = self.program.origins.at(first.first)[0]
+        unit, digits = (MM_PER_INCH, INCH_DECIMALS) if first.inch else (1.0, DECIMALS)
+        offset, grid = self.program.origins.at(first.first)[0], unit * 10.0**-digits
         points = self.place[first.first : run[-1].last + 1] - offset
-        moves = fewest_moves(points, self.within, unit * 10.0**-digits, arcs=self.arcs)
+        moves = fewest_moves(points, self.within, grid, arcs=self.arcs)
         if moves.normal[-1] != STRAIGHT:  # what follows may count on G1 and the plane
-            moves = fewest_moves(points[:-1], self.within, unit * 10.0**-digits, arcs=self.arcs)
+            moves = fewest_moves(points[:-1], self.within, grid, arcs=self.arcs)
             moves = Moves(
                 np.append(moves.end, len(run)),
                 np.append(moves.normal, STRAIGHT),
@@ -188,15 +176,11 @@ class _Writer:
                 texts |= {word.letter: word.text for word in row.words if word.letter in LINEAR}
             if not same:
                 words += [code] * (code != said)
-                moved = points[at] != points[end]
-                words += [
-                    c + texts[c] for c, far in zip(LINEAR, moved.tolist(), strict=True) if far and c in texts
-                ]
+                moved = zip(LINEAR, (points[at] != points[end]).tolist(), strict=True)
+                words += [letter + texts[letter] for letter, far in moved if far and letter in texts]
                 if normal != STRAIGHT:
-                    words += [
-                        f"{letter}{plain(round(away / unit, digits) + 0.0)}"
-                        for letter, away in zip(_ARC_WORDS[normal], moves.center[m].tolist(), strict=False)
-                    ]
+                    center = zip(_ARC_WORDS[normal], moves.center[m].tolist(), strict=False)
+                    words += [letter + plain(round(far / unit, digits) + 0.0) for letter, far in center]
                 feed = rows[0].value("F") if at == 0 else None
                 words += [str(feed)] * (feed is not None)
                 self._put(rows, words)

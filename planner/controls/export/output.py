@@ -98,15 +98,12 @@ class Output:
             return [str(own)] if own is not None else []
         unit = MM_PER_INCH if self.inch else 1.0
         if given is None:  # the machine's default
-            block = next((k for k in range(row.first, row.last) if np.isfinite(self.program.feed[k])), None)
-            return (
-                []
-                if block is None
-                else self._feed_of(float(self.program.feed[block]) * SECONDS_PER_MINUTE / unit)
-            )
-        same = self.feed_inch == self.inch
-        value = given.value if same else given.value * (MM_PER_INCH if self.feed_inch else 1.0) / unit
-        return self._feed_of(value, given.text if same else "")
+            feeds = self.program.feed[row.first : row.last]
+            known = feeds[np.isfinite(feeds)].tolist()
+            return self._feed_of(known[0] * SECONDS_PER_MINUTE / unit) if known else []
+        if self.feed_inch == self.inch:
+            return self._feed_of(given.value, given.text)
+        return self._feed_of(given.value * (MM_PER_INCH if self.feed_inch else 1.0) / unit)
 
     def _feed_of(self, value: float, text: str = "", *, as_is: bool = True) -> list[str]:
         written = text or (plain(round(value, INCH_DECIMALS)) if as_is else round_down(value))
@@ -119,10 +116,6 @@ class Output:
         """A line that is no move; the next move says its code again."""
         self.lines.append(text)
         self.motion = ""
-
-    def comment(self, text: str) -> str:
-        """A comment of the control."""
-        return comment(text, self.control)
 
     def _option(self, name: str, row: Row) -> None:
         said = OPTIONS.get((self.control.name, name))
@@ -158,12 +151,7 @@ def called(macro: str, words: list[Word]) -> str:
 
 
 FIRST_RUN = "First run: above the work, a hand on feed hold."
-_MODES = {
-    "units": (210, "G21"),
-    "plane": (170, "G17"),
-    "distance mode": (900, "G90"),
-    "feed mode": (940, "G94"),
-}
+_MODES = {"units": 210, "plane": 170, "distance mode": 900, "feed mode": 940}
 
 
 def head_of(source: Source, control: Control, plan: Plan, tolerance: float, what: str) -> list[str]:
@@ -184,14 +172,10 @@ def assumptions(source: Source, *, as_it_is: bool = False) -> list[str]:
     used = sorted({code for row in source.rows for code in row.g() if codes.G_GROUP[code] == "work offset"})
     system = " ".join(system_name(code) for code in used) or "the work offset in force"
     first = 0 if as_it_is else next((row.line for row in source.rows if row.plain), 0)
-    own = (
-        f"up to line {first - 1} the moves are the program's own"
-        if first
-        else "all lines are the program's own"
-    )
-    start = " ".join(
-        f"{axis.upper()}{plain(float(at))}" for axis, at in zip(program.axes, program.start, strict=True)
-    )
+    own = f"up to line {first - 1} the moves" if first else "all lines"
+    own += " are the program's own"
+    axes = zip(program.axes, program.start.tolist(), strict=True)
+    start = " ".join(f"{axis.upper()}{plain(at)}" for axis, at in axes)
     return [
         f"Coordinates are the program's, in {system}; G53, G28, G30 stay as they are.",
         f"Planned from machine position {start}; {own}, from any start.",
@@ -207,5 +191,5 @@ def _modes(source: Source, control: Control) -> list[str]:
         if row.moves or row.text:
             break
     said -= {"distance mode"}  # which waits for a move
-    words = [text for group, (code, text) in _MODES.items() if group not in said and code in control.g]
+    words = [f"G{code // 10}" for group, code in _MODES.items() if group not in said and code in control.g]
     return words if control.one_command else [" ".join(words)] * bool(words)

@@ -12,13 +12,12 @@ Plan and chords share the tolerance: what the verdict found of the plan's errors
 of LinuxCNC add up to it at most. A plan that uses all of it leaves no room; one with a tenth less does.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from planner.base.errors import InputError
-from planner.base.units import MICROMETRE
 from planner.controls.export.candidates import (
     AS_IT_IS,
     Candidate,
@@ -29,7 +28,7 @@ from planner.controls.export.candidates import (
 from planner.controls.export.controls import CONTROLS, LINUXCNC
 from planner.controls.export.output import FIRST_RUN, assumptions
 from planner.controls.timing.models import CONTROLS as MODELS
-from planner.controls.timing.models import predicted_time
+from planner.controls.timing.models import predicted_times
 from planner.controls.timing.times import feed_in_force, standing
 from planner.planning.job.plan import Plan
 
@@ -110,12 +109,9 @@ def _sentence(chosen: Candidate) -> str:
 def _candidates(job: Candidates) -> list[Candidate]:
     """For controls that stay on the path."""
     room = job.room
-    found = []
-    for share in SHARES if room is not None else ():
-        chords = share * (room or 0.0)
-        found += job.chords(chords, f"planned path, chords within {chords / MICROMETRE:.3g} µm")
+    found = [one for share in SHARES if room is not None for one in job.chords(share * room)]
     found += job.own(room or job.tolerance)
-    return [one.at(_predicted(job, one)) for one in found]
+    return [replace(one, time=_predicted(job, one)) for one in found]
 
 
 def _predicted(job: Candidates, one: Candidate) -> float:
@@ -125,7 +121,6 @@ def _predicted(job: Candidates, one: Candidate) -> float:
     if one.name == AS_IT_IS and job.control.rapid_feed:
         feed = np.where(line.rapid, feed_in_force(plan.program, job.text or b"")[line.block], feed)
     stands = standing(plan.program, line.block, switches=job.control.name != "klipper")
-    moving = predicted_time(
-        line.points, feed, stands, plan.machine, plan.toolpath.axes, MODELS[job.control.name]
-    )
-    return moving + float(plan.toolpath.dwell.sum())
+    model = MODELS[job.control.name]
+    moving = predicted_times(line.points, feed, stands, plan.machine, plan.toolpath.axes, model)
+    return float(moving.sum()) + float(plan.toolpath.dwell.sum())

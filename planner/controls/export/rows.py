@@ -260,14 +260,13 @@ class _Follower:
             for other in row.others:
                 if f"{other[0]}" == SPEED_FACTOR:  # F words of chords would count by it once more
                     self.factor = next((word.value for word in other if word.letter == "S"), 0.0)
-            if row.text:
-                row.absolute, row.inch, row.per_minute = self.absolute, self.inch, self.per_minute
-                if row.last > row.first:  # homing
-                    self.placed = frozenset()
-                continue
             g = row.g()
             self._modes(g)
             row.absolute, row.inch, row.per_minute = self.absolute, self.inch, self.per_minute
+            if row.text:
+                if row.last > row.first:  # homing
+                    self.placed = frozenset()
+                continue
             row.plane = _IN_PLANE[self.plane]
             row.radius = self.radius or not COMPENSATION_ON.isdisjoint(g)
             if any(codes.G_GROUP[code] == "work offset" or code in SHIFTS for code in g):
@@ -321,11 +320,8 @@ class _Follower:
 
     def _is_plain(self, row: Row, named: frozenset[str]) -> bool:
         blocks = slice(row.first, row.last)
-        needed = named
-        if row.motion in codes.CYCLES or row.radius:
-            needed = needed | frozenset(LINEAR)
-        elif row.motion > 10:
-            needed = needed | frozenset(row.plane)
+        whole = row.motion in codes.CYCLES or row.radius
+        needed = named | frozenset(LINEAR if whole else row.plane if row.motion > 10 else "")
         cycle = row.motion in _ROUGH_CYCLES
         known = row.motion <= 30 or cycle or row.motion in codes.SPLINES
         return bool(

@@ -10,14 +10,14 @@ from planner.base.errors import InputError
 from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.controls.export.chords import DECIMALS
 from planner.controls.export.controls import Control, is_command, is_setting, sets_tools, takes_move
-from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, Word, rows_of
+from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, rows_of
 from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.language.detect import without_leader
 from planner.nc.points import own_text
 from planner.nc.program import FEED_MOVES, Kind, Program, plain
 from planner.nc.reader import parse_program
-from planner.nc.reading import ABSOLUTE, AUTO, INCREMENTAL, LINUXCNC
+from planner.nc.reading import ABSOLUTE, AUTO, INCREMENTAL, LINUXCNC, Reading
 from planner.nc.text import program_text
 from planner.nc.writer import FEED_MIN, round_down
 from planner.planning.job.plan import Plan
@@ -59,19 +59,16 @@ def _read(text: bytes, plan: Plan, how: str) -> Source:
     return rows_of(text, _same(text, plan, reading, f", {how},"), plan.machine)
 
 
-def _same(text: bytes, plan: Plan, reading: object, how: str) -> Program:
+def _same(text: bytes, plan: Plan, reading: Reading, how: str) -> Program:
     """The program that the text reads as. Raises InputError if that is not the plan's program."""
     program = plan.program
+    said = f"the program{how} does not read back"
     try:
-        read = parse_program(text, plan.machine, reading, source=program.source)  # type: ignore[arg-type]
+        read = parse_program(text, plan.machine, reading, source=program.source)
     except InputError as fault:
-        raise InputError(
-            f"the program{how} does not read back: {fault.message}", source=program.source
-        ) from None
+        raise InputError(f"{said}: {fault.message}", source=program.source) from None
     if not same_places(read, program):
-        raise InputError(
-            f"the program{how} does not read back as the one that was planned", source=program.source
-        )
+        raise InputError(f"{said} as the one that was planned", source=program.source)
     return read
 
 
@@ -161,35 +158,28 @@ def _row_why_not(row: Row, source: Source, control: Control) -> str:
     if row.text:
         return "" if is_command(row.text, control) else f"{row.text!r} is no command of this control"
     for other in row.others:
-        if not _is_known(other, source, control):
+        name = f"{other[0].letter}{codes.number(other[0].code)}"
+        left_out = control.percent and (name[0] == "%" or name in source.program.reading.ignore)
+        if not left_out and not is_setting(other, control):
             return f"{''.join(map(str, other))} is not known"
     for word in row.words:
         arc = word.code in codes.ARCS and control.name == "marlin"
-        known_code = word.letter not in "GM" or (
-            (word.code in control.g or arc) if word.letter == "G" else word.code // 10 in control.m
-        )
-        if not known_code:
+        unknown = {
+            "G": word.code not in control.g and not arc,
+            "M": word.code // 10 not in control.m,
+        }.get(word.letter)
+        if unknown:
             return f"{word} is not known"
-        if not control.one_command and word.letter not in "GM" and word.letter not in control.letters:
+        if unknown is None and not control.one_command and word.letter not in control.letters:
             return f"{word}: letter {word.letter} is not known"
-    if G4 in row.g() and _dwells_otherwise(row, source, control):
-        return "the P of G4 lasts otherwise there"
+    if G4 in row.g():
+        p = row.value("P")
+        lasts = 0.0 if p is None else p.value * (MILLISECOND if control.milliseconds else 1.0)
+        if abs(lasts - source.dwell(row)) > SAME_DWELL:
+            return "the P of G4 lasts otherwise there"
     if control.one_command:
         return _line_why_not(row)
     return _rs274_why_not(row, source) if control.name == LINUXCNC else _grbl_why_not(row, source, control)
-
-
-def _is_known(words: list[Word], source: Source, control: Control) -> bool:
-    """Whether the control knows a code that is none of moves and modes."""
-    name = f"{words[0].letter}{codes.number(words[0].code)}"
-    left_out = control.percent and (name[0] == "%" or name in source.program.reading.ignore)
-    return left_out or is_setting(words, control)
-
-
-def _dwells_otherwise(row: Row, source: Source, control: Control) -> bool:
-    word = row.value("P")
-    lasts = 0.0 if word is None else word.value * (MILLISECOND if control.milliseconds else 1.0)
-    return abs(lasts - source.dwell(row)) > SAME_DWELL
 
 
 def _line_why_not(row: Row) -> str:

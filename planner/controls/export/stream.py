@@ -51,10 +51,8 @@ def scale_of(trajectory: Trajectory, unit: str) -> FloatArray:
     unit."""
     if unit not in UNITS:
         raise InputError(f"no unit '{unit}'; there are {', '.join(UNITS)}")
-    degrees = trajectory.in_degrees
-    return np.array(
-        [degrees[k] if axis in ROTARY_AXES else 1.0 / UNITS[unit] for k, axis in enumerate(trajectory.axes)]
-    )
+    rotary = [axis in ROTARY_AXES for axis in trajectory.axes]
+    return np.where(rotary, trajectory.in_degrees, 1.0 / UNITS[unit])
 
 
 def _signals(axes: tuple[str, ...]) -> list[str]:

@@ -3,7 +3,7 @@ stops, codes of other kinds."""
 
 from planner.base.units import MILLISECOND
 from planner.controls.export.controls import is_command, is_setting
-from planner.controls.export.output import Output, called
+from planner.controls.export.output import Output, called, comment
 from planner.controls.export.rows import COMPENSATION_OFF, COMPENSATION_ON, ENDS, LENGTHS, Row, Word
 from planner.nc import codes
 from planner.nc.program import plain
@@ -79,9 +79,8 @@ class Switches(Output):
 
     def _turn(self, row: Row, code: int, macro: str | None) -> None:
         """The spindle or the laser, on or off, with the speed that waits for it."""
-        speed = (
-            [self.speed] if self.speed is not None and code != _SPINDLE_OFF and _G96 not in row.g() else []
-        )
+        turns = code != _SPINDLE_OFF and _G96 not in row.g()
+        speed = [self.speed] if self.speed is not None and turns else []
         if macro is not None:
             self._say(called(macro, speed))
         elif code in self.control.m:
@@ -105,7 +104,7 @@ class Switches(Output):
             self._option(pause, row)
             what = f"{pause} for the tool change: change to {self.tool or 'the tool'} by hand, set its zero, go on"
             self._note("M6", what, row)
-            self._say(self.comment(f"tool change: {self.tool or 'T'}"))
+            self._say(comment(f"tool change: {self.tool or 'T'}", self.control))
             self._say(pause)
 
     def _modes(self, row: Row, *, chords: bool) -> None:
@@ -164,9 +163,8 @@ class Switches(Output):
 
     def _say_dwell(self, seconds: float) -> None:
         self._flush_speed()
-        self._say(
-            f"G4 P{plain(round(seconds / MILLISECOND, 3) if self.control.milliseconds else round(seconds, 6))}"
-        )
+        lasts = round(seconds / MILLISECOND, 3) if self.control.milliseconds else round(seconds, 6)
+        self._say(f"G4 P{plain(lasts)}")
 
     def _stops(self, row: Row) -> None:
         for code in row.m():
@@ -174,9 +172,7 @@ class Switches(Output):
                 self._end(f"M{code}")
             elif code in (0, 1, 60):
                 name = f"M{code}"
-                text = self.machine.macros.get(name) or (
-                    name if code in self.control.m else self.control.instead[name]
-                )
+                text = self.machine.macros.get(name) or self.control.instead.get(name, name)
                 self._option(text, row)
                 self._flush_speed()
                 self._say(text)

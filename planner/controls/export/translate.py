@@ -6,15 +6,13 @@ same coordinates.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.controls.export.chords import DECIMALS, LINEAR, Polyline
-from planner.controls.export.controls import GRBL, Control, sets_tools, takes_move
-from planner.controls.export.filament import Filament
+from planner.controls.export.controls import GRBL, MARLIN, Control, sets_tools, takes_move
 from planner.controls.export.output import INCH_DECIMALS
 from planner.controls.export.rows import G4, G10, G53, HOMES, LENGTHS, Row, Source, Word
 from planner.controls.export.switches import Switches
@@ -25,13 +23,56 @@ from planner.nc.reading import FANUC, IGNORE
 from planner.nc.settings import AXES
 from planner.nc.writer import FEED_MIN
 
+FILAMENT_DECIMALS = 5  # of E in mm, as slicers write it
 
-@dataclass(frozen=True, kw_only=True)
-class Translation:
-    """The program as written."""
 
-    lines: list[str]  # of the file, without its header
-    notes: tuple[str, ...]  # what was left out, or is written another way, each with its first line
+class Filament:
+    """The extruder of a control behind the rows followed so far, by the control's own rules: E is a step after M83 and
+    under G91; Marlin's G90 also ends M83. Where E is at the start nothing tells, nor after a tool change or a macro; G92
+    and places do.
+
+    place : what its E is called [mm], NaN where nothing has told it
+    steps : E words are steps, whatever G90 and G91 say of the other axes
+    """
+
+    def __init__(self, control: Control, machine: Machine):
+        self.one_mode = control.name == MARLIN.name  # G90 and G91 set it for E too
+        self.macros = machine.macros
+        self.place, self.steps = np.nan, False
+
+    def shared(self, row: Row, points: FloatArray) -> list[float] | None:
+        """The E of a row for each of the chords between points (n+1, 3) [mm], in proportion to their lengths, in
+        all the row's own; None where it is a place and the one before is not known, and without a length."""
+        word = row.value("E")
+        assert word is not None
+        end = _millimetres(word, row)
+        begin = 0.0 if self.steps else self.place
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        if np.isnan(begin) or not along[-1] > 0.0:
+            return None
+        at = np.round(begin + along / along[-1] * (end - begin), FILAMENT_DECIMALS)
+        at[-1] = end
+        shares: list[float] = np.round(np.diff(at) if self.steps else at[1:], FILAMENT_DECIMALS).tolist()
+        return shares
+
+    def follow(self, row: Row) -> None:
+        """Go on behind a row."""
+        words = [*row.words, *(word for other in row.others for word in other)]
+        said = {f"{word.letter}{codes.number(word.code)}" for word in words if word.letter in "GM"}
+        if "M6" in said or not said.isdisjoint(self.macros):
+            self.place = np.nan
+        if not said.isdisjoint(("M82", "M83")):
+            self.steps = "M83" in said
+        if self.one_mode and not said.isdisjoint(("G90", "G91")):
+            self.steps = "G91" in said
+        amount = next((_millimetres(word, row) for word in words if word.letter == "E"), None)
+        if amount is not None and ("G92" in said or row.feeds):
+            adds = (self.steps or not (self.one_mode or row.absolute)) and "G92" not in said
+            self.place = amount + (self.place if adds else 0.0)
+
+
+def _millimetres(word: Word, row: Row) -> float:
+    return word.value * (MM_PER_INCH if row.inch else 1.0)
 
 
 class Translator(Switches):
@@ -55,14 +96,14 @@ class Translator(Switches):
         self.move = 0  # of the polyline
         self.filament = Filament(control, machine)
 
-    def translated(self) -> Translation:
-        """The whole program. Raises InputError for the first line that the control has no words for."""
+    def translated(self) -> tuple[list[str], tuple[str, ...]]:
+        """The lines of the file without its header, and what was left out, or is written another way, each with its first
+        line. Raises InputError for the first line that the control has no words for."""
         for row, chords in zip(self.source.rows, self.replaced.tolist(), strict=True):
             self._row(row, chords=chords)
         if not self.ended:
             self._end()
-        notes = tuple(f"line {line}: {text}" for text, line in self.notes.values())
-        return Translation(lines=self.lines, notes=notes)
+        return self.lines, tuple(f"line {line}: {text}" for text, line in self.notes.values())
 
     def _row(self, row: Row, *, chords: bool) -> None:
         if row.text:
@@ -72,7 +113,10 @@ class Translator(Switches):
         for other in row.others:
             self._other(row, other)
         if row.feeds and not self.control.extruder:
-            self._no_extruder(row)
+            word = row.value("E")
+            if self.program.reading.extruder != IGNORE:
+                self._refuse(row, f"{word}: an extruder")
+            self._note("E", f"{word} is left out, as --extruder ignore says", row)
         feed = row.value("F")
         if feed is not None:
             self.programmed_feed, self.feed_inch = feed, row.inch_before
@@ -99,14 +143,10 @@ class Translator(Switches):
             return  # the coordinates are those of the tool length
         if one_shot == G10 and self.program.reading.dialect == FANUC:
             self._refuse(row, "G10, which other controls read otherwise than Fanuc's")
-        if (
-            one_shot in HOMES
-            and self.control.one_command
-            and (row.named or self.program.origins.at(row.first)[0].any())
-        ):
-            self._refuse(
-                row, f"G{codes.number(one_shot)} with coordinates, or after G92 (this control homes there)"
-            )
+        away = row.named or self.program.origins.at(row.first)[0].any()
+        if one_shot in HOMES and self.control.one_command and away:
+            name = f"G{codes.number(one_shot)}"
+            self._refuse(row, f"{name} with coordinates, or after G92 (this control homes there)")
         head, fed = self._head(row, one_shot)
         if head is None:
             return
@@ -123,10 +163,9 @@ class Translator(Switches):
         if fed:
             words += self._feed_words(row)
         elif row.motion == 0 and self.control.rapid_feed and row.named:
-            limits = self.machine.limits(
-                "velocity", tuple(c.lower() for c in row.named if c.lower() in self.machine.axes)
-            )
-            words += self._feed_of(float(limits.min()) * SECONDS_PER_MINUTE, as_is=False)
+            axes = tuple(c for c in row.named.lower() if c in self.machine.axes)
+            fastest = float(self.machine.limits("velocity", axes).min())
+            words += self._feed_of(fastest * SECONDS_PER_MINUTE, as_is=False)
         distance = self._distance(absolute=row.absolute) if row.named or row.moves else []
         self._say_move(row, distance, [*head, *words])
         self.motion = self.motion if one_shot < 0 else ""
@@ -157,37 +196,19 @@ class Translator(Switches):
             return "its feed is not per minute"
         if self.extrudes and not row.absolute:
             return "it is under G91, where E is a step; write it under G90"
-        away = [c for c in "XYZ" if c not in row.placed]
-        return (
-            f"the program does not say where {' and '.join(away)} are before it"
-            if away
-            else "it is no plain move"
-        )
+        away = " and ".join(c for c in "XYZ" if c not in row.placed)
+        return f"the program does not say where {away} are before it" if away else "it is no plain move"
 
     def _used(self, row: Row) -> set[str]:
         """Letters of a row that belong to its move: not those of its modes."""
-        modal = {
-            letter
-            for code in row.g()
-            if codes.G_GROUP[code] not in ("motion", "one-shot")
-            for letter in codes.WORDS.get(("G", code), "")
-        }
+        modes = [code for code in row.g() if codes.G_GROUP[code] not in ("motion", "one-shot")]
+        modal = set("".join(codes.WORDS.get(("G", code), "") for code in modes))
         shot = set(codes.WORDS["G", G10]) if G10 in row.g() else set()
         motion = set(codes.WORDS.get(("G", row.motion), "")) if row.motion >= 0 else set()
         if row.motion in codes.ARCS:  # many programs write K0 in G17, which is an error on LinuxCNC
             motion -= {"IJK"["XYZ".index(axis)] for axis in "XYZ" if axis not in row.plane}
-        return (
-            (set(AXES + "E" * (row.feeds and self.control.extruder)) | shot | motion)
-            - (modal - motion - shot)
-            - ({"P"} if G4 in row.g() else set())
-        )
-
-    def _no_extruder(self, row: Row) -> None:
-        """E on a control without an extruder: left out if the user says so."""
-        word = row.value("E")
-        if self.program.reading.extruder != IGNORE:
-            self._refuse(row, f"{word}: an extruder")
-        self._note("E", f"{word} is left out, as --extruder ignore says", row)
+        own = set(AXES + "E" * (row.feeds and self.control.extruder)) | shot | motion
+        return own - (modal - motion - shot) - set("P" * (G4 in row.g()))
 
     def _parked(self, row: Row, word: Word) -> None:
         """An axis that the control does not have: its words may go where it stands still."""

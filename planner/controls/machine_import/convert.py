@@ -71,13 +71,9 @@ def import_machine(
     names of `given` that are none.
     """
     text, source = read_settings(Path(path)), str(path)
-    found = _settings_of(text, source, control)
-    lathe = _without_y(found)
-    axes, assumed = _axes(lathe or found, ramp_time, given or {}, source)
-    if lathe is not None:
-        assumed.append(
-            "y: the machine has none; its limits are those of x, and a program that moves y is not refused"
-        )
+    found, lathe = _with_y(_settings_of(text, source, control))
+    axes, assumed = _axes(found, ramp_time, given or {}, source)
+    assumed += lathe
     eps = found.tolerance or Sourced(TOLERANCE[found.control], "assumed")
     if tolerance is not None:
         eps = Sourced(tolerance, "given")
@@ -86,7 +82,7 @@ def import_machine(
         assumed.append(f"tolerance {eps.value:g} mm: the settings have none; --tolerance gives another")
     if dt.place == "assumed":
         assumed.append(f"interpolation period {dt.value * 1e3:g} ms: the settings do not say it")
-    written = _text(lathe or found, Path(path), axes, eps, dt, [*found.notes, *assumed])
+    written = _text(found, Path(path), axes, eps, dt, [*found.notes, *assumed])
     machine = machine_from_dict(tomllib.loads(written), source=source)
     return Imported(written, machine, (*found.notes, *assumed))
 
@@ -111,13 +107,14 @@ def _settings_of(text: str, source: str, control: str | None) -> ControlSettings
     )
 
 
-def _without_y(found: ControlSettings) -> ControlSettings | None:
-    """The settings of a lathe, which says nothing of y, with those of x for y; None for other machines."""
+def _with_y(found: ControlSettings) -> tuple[ControlSettings, list[str]]:
+    """The settings; of a lathe, which says nothing of y, with those of x for y, and that this is assumed."""
     limits = (found.velocity, found.acceleration)
     if not all("z" in limit and "x" in limit and "y" not in limit for limit in limits):
-        return None
+        return found, []
     of_x = [{**limit, "y": Sourced(limit["x"].value, "x's: the machine has no y")} for limit in limits]
-    return dataclasses.replace(found, velocity=of_x[0], acceleration=of_x[1])
+    said = "y: the machine has none; its limits are those of x, and a program that moves y is not refused"
+    return dataclasses.replace(found, velocity=of_x[0], acceleration=of_x[1]), [said]
 
 
 def _axes(
@@ -191,7 +188,8 @@ def _text(
             f"frequency = {mode.frequency!r}  # {mode.place}",
             f"damping = {mode.damping!r}",
         ]
-    return "\n".join(_printable(line) for line in lines) + "\n"
+    # TOML takes nothing else in names and comments, and settings may have any character in a value that is quoted
+    return "".join(c if c.isprintable() or c == "\n" else "-" for line in lines for c in f"{line}\n")
 
 
 def _tables(found: ControlSettings) -> list[str]:
@@ -206,19 +204,11 @@ def _tables(found: ControlSettings) -> list[str]:
     if found.corner_jump:
         lines += ["", "[control.corner_jump]", *(_line(*jump) for jump in found.corner_jump.items())]
     if found.kinematics:
-        lines += ["", "[kinematics]"]
-        lines += [
-            f'{key} = "{value}"' if isinstance(value, str) else _line(key, value)
-            for key, value in found.kinematics.items()
-        ]
+        lines += ["", "[kinematics]", *(_line(*pair) for pair in found.kinematics.items())]
     return lines
 
 
-def _printable(text: str) -> str:
-    """The text without what TOML does not take in names and comments: settings may have any character in a
-    value that is quoted."""
-    return "".join(c if c.isprintable() else "-" for c in text)
-
-
-def _line(key: str, found: Sourced) -> str:
+def _line(key: str, found: Sourced | str) -> str:
+    if isinstance(found, str):
+        return f'{key} = "{found}"'
     return f"{key} = {float(f'{found.value:.12g}')!r}  # {found.place}"

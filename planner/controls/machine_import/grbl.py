@@ -33,19 +33,17 @@ def settings(text: str, source: str) -> ControlSettings:
     deviation, laser, bounded = (given.number("", key) for key in ("$11", "$32", "$20"))
     notes = []
     if travel and bounded and not bounded.value:
-        notes.append(
-            "$20 is 0, no soft limits: travel is left out, $130 and so on may be those of grbl's delivery"
-        )
         travel = {}
+        notes += [
+            "$20 is 0, no soft limits: travel is left out, $130 and so on may be those of grbl's delivery"
+        ]
     if laser and laser.value:
-        notes.append("$32, laser mode, is left out: M4 and S words change no times here")
+        notes += ["$32, laser mode, is left out: M4 and S words change no times here"]
     return ControlSettings(
         control="grbl",
         velocity=dict(given.limits(_LETTERS, "$11{axis}", 1.0 / SECONDS_PER_MINUTE)),
         acceleration=dict(given.limits(_LETTERS, "$12{axis}")),
-        law={}
-        if deviation is None
-        else {"junction_deviation": deviation._replace(value=abs(deviation.value))},
+        law={"junction_deviation": deviation and deviation._replace(value=abs(deviation.value))},
         travel=travel,
         notes=tuple(notes),
     )

@@ -10,13 +10,7 @@ import re
 
 from planner.base.errors import InputError
 from planner.controls.machine_import.ini_file import read_klipper_config
-from planner.controls.machine_import.settings import (
-    ControlSettings,
-    FoundMode,
-    Settings,
-    Sourced,
-    least,
-)
+from planner.controls.machine_import.settings import ControlSettings, FoundMode, Settings, Sourced, least
 
 _PER_AXIS = ("cartesian", "corexy", "hybrid_corexy", "corexz", "hybrid_corexz", "generic_cartesian")
 _MACRO = re.compile(r"gcode_macro\s+(\w+(?:\.\d+)?)", re.IGNORECASE | re.ASCII)
@@ -44,9 +38,8 @@ def settings(text: str, source: str) -> ControlSettings:
     limits = {}
     for key in ("velocity", "accel"):
         path, z = (config.positive("printer", f"max_{which}{key}") for which in ("", "z_"))
-        limits[key] = {
-            letter: found for letter, found in (("x", path), ("y", path), ("z", least(z, path))) if found
-        }
+        axes = {"x": path, "y": path, "z": least(z, path)}
+        limits[key] = {letter: found for letter, found in axes.items() if found}
     along = config.positive("printer", "max_accel")
     modes: dict[float, FoundMode] = {}
     for letter in "xy":

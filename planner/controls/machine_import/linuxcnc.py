@@ -19,6 +19,7 @@ The table [kinematics] is what the commands of HAL set the pins of the kinematic
 
 import math
 import re
+from contextlib import suppress
 from pathlib import Path
 
 from planner.base.errors import InputError
@@ -31,7 +32,7 @@ from planner.controls.machine_import.settings import (
     Sourced,
     leading_number,
     least,
-)
+)  # fmt: skip
 from planner.machine import ROTARY_AXES
 from planner.machine.parts import AXIS_LIMIT_MAX, XYZAC, XYZBC
 
@@ -55,15 +56,12 @@ _USUAL = frozenset(
 )
 _PATH_CONTROL = {"G64": "blend", "G61": "exact_path", "G61.1": "exact_stop"}
 # Files that a machine file does not have: what they hold, and the table that takes it.
-_FILES = (
-    (
-        "RS274NGC",
-        "PARAMETER_FILE",
-        "work offsets and the places of G28 and G30",
-        "[work_offsets] and [positions] take",
+_FILES = {
+    ("RS274NGC", "PARAMETER_FILE"): (
+        "work offsets and the places of G28 and G30", "[work_offsets] and [positions] take"
     ),
-    ("EMCIO", "TOOL_TABLE", "lengths and diameters of tools", "[tools] takes"),
-)
+    ("EMCIO", "TOOL_TABLE"): ("lengths and diameters of tools", "[tools] takes"),
+}  # fmt: skip
 _STARTUP = "RS274NGC", "RS274NGC_STARTUP_CODE"
 _TYPES = {f"{XYZAC}-kins": XYZAC, f"{XYZBC}-kins": XYZBC}  # module of LinuxCNC: type of a machine file
 _DISTANCES = {
@@ -176,8 +174,8 @@ class _Found:
         """
         module = self.module
         if jointless := [letter for letter in self.letters if self.joints and letter not in self.joints]:
-            said = f"[KINS] KINEMATICS moves no axis {', '.join(jointless)}, which COORDINATES names"
-            self.notes.append(said)
+            named = ", ".join(jointless)
+            self.notes.append(f"[KINS] KINEMATICS moves no axis {named}, which COORDINATES names")
         if module == "trivkins":
             return {}
         if module not in _TYPES:
@@ -204,10 +202,8 @@ class _Found:
         ini = self.ini
         lines = ini.texts("HAL", "HALCMD")
         for name in ini.texts("HAL", "HALFILE") + ini.texts("HAL", "POSTGUI_HALFILE"):
-            try:
+            with suppress(InputError):  # of LinuxCNC's library, or not here
                 lines += read_settings(Path(self.source).parent / name.split()[0]).splitlines()
-            except InputError:
-                continue  # of LinuxCNC's library, or not here
         said: dict[str, dict[str, str]] = {"setp": {}, "sets": {}}
         joined: dict[str, str] = {}
         for line in lines:
@@ -230,11 +226,10 @@ class _Found:
         ini, said = self.ini, []
         for letter in self.letters:
             if (found := ini.number(self.table[letter], "LOCKING_INDEXER_JOINT")) and found.value >= 0:
-                said.append(
-                    f"{letter} is a locking indexer in LinuxCNC, which moves by G0 alone: here it is an axis like others"
-                )
-        for table, key, things, takes in _FILES:
-            if name := ini.text(table, key):
+                other = "is a locking indexer in LinuxCNC, which moves by G0 alone: here it is an axis like others"
+                said.append(f"{letter} {other}")
+        for key, (things, takes) in _FILES.items():
+            if name := ini.text(*key):
                 said.append(f"{things} are in {name} and are left out: {takes} them")
         codes = [remap.split()[0].upper() for remap in ini.texts("RS274NGC", "REMAP") if remap.split()]
         codes = [code for code in codes if self.module not in _JOINTS or code not in ("M428", "M429")]
@@ -246,13 +241,12 @@ class _Found:
         """The ends of an axis, and of the joints that move it alone; None for what means none, such as 1e99."""
         scale = self.scale[letter]
         tables = [self.table[letter], *(f"JOINT_{n}" for n, c in enumerate(self.joints) if c == letter)]
-        found = [
-            [self.ini.number(table, f"{end}_LIMIT", scale) for table in tables] for end in ("MIN", "MAX")
-        ]
-        low, high = (
-            [one for one in ends if one and abs(one.value) < AXIS_LIMIT_MAX * scale] for ends in found
-        )
-        return max(low, default=None), min(high, default=None)
+
+        def ends(key: str) -> list[Sourced]:
+            found = [self.ini.number(table, key, scale) for table in tables]
+            return [one for one in found if one and abs(one.value) < AXIS_LIMIT_MAX * scale]
+
+        return max(ends("MIN_LIMIT"), default=None), min(ends("MAX_LIMIT"), default=None)
 
 
 def _possible(found: Sourced | None) -> Sourced | None:

@@ -40,6 +40,7 @@ def settings(text: str, source: str) -> ControlSettings:
     """The settings that M503 printed. Raises InputError for numbers that cannot be used."""
     given, travel, unit = Settings("{table} {key}"), Settings("M208"), 1.0
     modes: dict[float, float] = {}
+    ends: list[tuple[str, str, str]] = []
     for command in _COMMAND.finditer(text):
         code, said = command.groups()
         line = text.count("\n", 0, command.start(1)) + 1
@@ -47,38 +48,33 @@ def settings(text: str, source: str) -> ControlSettings:
         if code in ("G20", "G21"):
             unit = MM_PER_INCH if code == "G20" else 1.0
         elif code == "M593":
-            modes |= (
-                {float(words["F"]): float(words.get("D", _DAMPING))} if float(words.get("F", 0.0)) > 0 else {}
-            )
+            if float(words.get("F", 0.0)) > 0:
+                modes[float(words["F"])] = float(words.get("D", _DAMPING))
         elif code == "M208":
-            _take_travel(travel, said, words, source)
+            ends += _ends(said, words)
         else:
             for letter, number in words.items():
                 given.add(code, letter, Setting(number, source, line))
-    if ends := _ENDS.search(text):
-        for end, said in zip(("low", "high"), ends.groups(), strict=True):
-            for letter, number in _WORD.findall(said):
-                travel.add(letter.lower(), end, Setting(number, source))
-                travel.names += [letter.lower()]
+    if found := _ENDS.search(text):
+        for end, said in zip(("low", "high"), found.groups(), strict=True):
+            ends += [(letter, end, number) for letter, number in _WORD.findall(said)]
+    for letter, end, number in ends:
+        travel.add(letter.lower(), end, Setting(number, source))
+        travel.names += [letter.lower()]
     given.counts_last()
     travel.counts_last()
     return _settings(given, unit, travel, tuple(FoundMode(*mode, "M593") for mode in modes.items()))
 
 
-def _take_travel(travel: Settings, said: str, words: dict[str, str], source: str) -> None:
-    """Take in M208 X0:200, or X200, which is the upper end, and the lower one with S1."""
+def _ends(said: str, words: dict[str, str]) -> list[tuple[str, str, str]]:
+    """Axis, end and number of M208 X0:200, or X200, which is the upper end, and the lower one with S1."""
     ranges = _RANGE.findall(said)
-    ends = [
-        (letter, end, number)
-        for letter, *both in ranges
-        for end, number in zip(("low", "high"), both, strict=True)
-    ]
     end = "low" if float(words.get("S", 0.0)) == 1 else "high"
     named = {letter for letter, *_ in ranges}
-    ends += [(c, end, words[c]) for c in _LETTERS.upper() if c in words and c not in named]
-    for letter, end, number in ends:
-        travel.add(letter.lower(), end, Setting(number, source))
-        travel.names += [letter.lower()]
+    both = [
+        (c, name, number) for c, *two in ranges for name, number in zip(("low", "high"), two, strict=True)
+    ]
+    return both + [(c, end, words[c]) for c in _LETTERS.upper() if c in words and c not in named]
 
 
 def _settings(

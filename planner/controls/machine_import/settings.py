@@ -20,10 +20,6 @@ class Sourced(NamedTuple):
     value: float
     place: str
 
-    def times(self, factor: float) -> Sourced:
-        """The same in another unit."""
-        return Sourced(self.value * factor, self.place)
-
 
 class FoundMode(NamedTuple):
     """A vibration mode: frequency [Hz], damping ratio [-], and where it stands."""

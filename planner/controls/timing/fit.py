@@ -10,6 +10,7 @@ file says. Velocities stay as they are there.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -52,6 +53,13 @@ class Found:
     settings: tuple[tuple[str, float, float], ...]
     residuals: tuple[tuple[str, float, float], ...]
 
+    def residual_texts(self) -> list[str]:
+        """The residuals in words."""
+        return [
+            f"{name}: {took:.3f} s measured, {said:.3f} s predicted ({100.0 * (said / took - 1.0):+.2f} %)"
+            for name, took, said in self.residuals
+        ]
+
 
 def programs_to_time(machine: Machine, control: str) -> dict[str, str]:
     """The texts of the five programs by the names of their files, for a machine and its control. They begin at X0 Y0 Z0."""
@@ -85,12 +93,8 @@ def _repeated(way: list[str], machine: Machine, control: str) -> str:
     def text(turns: int) -> str:
         return "\n".join([HEAD, "G1 X0 Y0 F600", *(way * turns), "M2", ""])
 
-    few, more = (_seconds(read_program(text=text(n)), machine, control) for n in (10, 20))
+    few, more = (control_times(read_program(text=text(n)), machine, control).seconds for n in (10, 20))
     return text(max(1, round(10 * LASTS / (more - few))))
-
-
-def _seconds(program: Program, machine: Machine, control: str) -> float:
-    return control_times(program, machine, control).seconds
 
 
 def fitted(measured: Mapping[str, tuple[Program, float]], machine: Machine, control: str) -> Found:
@@ -111,7 +115,7 @@ def fitted(measured: Mapping[str, tuple[Program, float]], machine: Machine, cont
 
     def times(log: FloatArray) -> FloatArray:
         found = _with(machine, control, dict(zip(names, start * np.exp(log), strict=True)))
-        return np.array([_seconds(program, found, control) for program, _ in measured.values()])
+        return np.array([control_times(program, found, control).seconds for program, _ in measured.values()])
 
     most = np.log([FACTORS[1] if name == "factor" else RANGE for name in names])
     done = least_squares(
@@ -175,13 +179,9 @@ def _with(machine: Machine, control: str, values: Mapping[str, float]) -> Machin
 def machine_text(found: Found, control: str) -> str:
     """The machine file of what was found, with where each setting comes from."""
     lines = [
-        f"# Measured on {control}: {name} {value:.6g}, before {before:.6g}."
-        for name, before, value in found.settings
+        f"# Measured on {control}: {name} {now:.6g}, before {was:.6g}." for name, was, now in found.settings
     ]
-    lines += [
-        f"# {name}: {took:.3f} s measured, {predicted:.3f} s predicted ({100.0 * (predicted / took - 1.0):+.2f} %)."
-        for name, took, predicted in found.residuals
-    ]
+    lines += [f"# {text}." for text in found.residual_texts()]
     return "\n".join([*lines, *_toml(found.machine.model_dump(exclude_defaults=True))]) + "\n"
 
 
@@ -196,12 +196,9 @@ def _toml(data: Mapping[str, object], name: str = "") -> list[str]:
 
 
 def _inline(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return f'"{value}"'
+    """A value as TOML has it, which but for tables is as in JSON."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_inline(key)} = {_inline(one)}" for key, one in value.items()) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_inline, value)) + "]"
-    return repr(value)
+    return json.dumps(value, ensure_ascii=False)

@@ -129,20 +129,7 @@ def linuxcnc_times(
     limits = _Limits(velocity, acceleration, machine.dt, machine.feed_max or np.inf)
     times[moves] = _times(bends, feed[moves], stop[1:-1], within, limits)
     given = machine.control
-    own = given is not None and given.name == "linuxcnc"
-    return times * (given.factor or 1.0) if given is not None and own else times
-
-
-def linuxcnc_time(
-    points: FloatArray,
-    feed: FloatArray,
-    stop: Array,
-    machine: Machine,
-    axes: tuple[str, ...],
-    tolerance: float,
-) -> float:
-    """`linuxcnc_times` of straight moves in all [s]: points (n+1, A), feed (n,), stop (n+1,)."""
-    return float(linuxcnc_times(points, feed, stop, machine, axes, tolerance).sum())
+    return times * (given.factor or 1.0) if given is not None and given.name == "linuxcnc" else times
 
 
 class _Limits(NamedTuple):
@@ -260,9 +247,5 @@ def _corners(
     change = change / np.where(np.isfinite(np.minimum(bends.radius[1:], bends.radius[:-1])), TANGENTIAL, 1.0)
     kink = slow * np.minimum(1.0, KINK / np.maximum(change, 1e-12))
     is_kink = (kink >= speed) | (change <= KINK)
-    return (
-        np.where(is_kink, 0.0, radius * np.tan(h)),
-        np.where(is_kink, 0.0, arc),
-        np.where(is_kink, kink, speed),
-        TANGENTIAL * a,
-    )
+    cut, arc = (np.where(is_kink, 0.0, of) for of in (radius * np.tan(h), arc))
+    return cut, arc, np.where(is_kink, kink, speed), TANGENTIAL * a

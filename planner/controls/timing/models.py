@@ -106,7 +106,7 @@ def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArra
     """Vertices (k+1, A), feeds (k,) and stops (k+1,) without the moves that move nothing, and which moves are left (n,): a
     stop between these belongs to the vertex before.
 
-    points, feed, stop : (n+1, A), (n,) and (n+1,), as of `predicted_time`
+    points, feed, stop : (n+1, A), (n,) and (n+1,), as of `predicted_times`
 
     Raises InputError where nothing moves.
     """
@@ -166,18 +166,6 @@ def predicted_times(
     peak = np.minimum(top**2, 0.5 * (v_sq[1:] + v_sq[:-1] + gain))
     times[moves] = control.factor * move_times(length, accel, v_sq[:-1], peak, v_sq[1:])
     return times
-
-
-def predicted_time(
-    points: FloatArray,
-    feed: FloatArray,
-    stop: Array,
-    machine: Machine,
-    axes: tuple[str, ...],
-    control: Control,
-) -> float:
-    """`predicted_times` of points (n+1, A), feed (n,) and stop (n+1,) in all [s]."""
-    return float(predicted_times(points, feed, stop, machine, axes, control).sum())
 
 
 def chords(control: Control, length: FloatArray, sweep: FloatArray, radius: FloatArray) -> Array:
@@ -276,10 +264,8 @@ def move_times(
     """(n,) times of blocks of a length from x0 over a peak to x1, squares of speeds, with constant accel,
     (n,) all."""
     v0, v, v1 = np.sqrt(x0), np.sqrt(np.maximum(peak, np.maximum(x0, x1))), np.sqrt(x1)
-    ramps = (2.0 * v * v - x0 - x1) / (2.0 * accel)
-    times: FloatArray = (2.0 * v - v0 - v1) / accel + np.maximum(length - ramps, 0.0) / np.maximum(
-        v, STANDING
-    )
+    even = np.maximum(length - (2.0 * v * v - x0 - x1) / (2.0 * accel), 0.0)  # way without acceleration
+    times: FloatArray = (2.0 * v - v0 - v1) / accel + even / np.maximum(v, STANDING)
     return times
 
 

@@ -66,7 +66,7 @@ def test_words_that_do_not_tell_where_an_axis_is(told: str) -> None:
     text = f"G21 G90\nG53 G0 Z20\nG0 X0 Y0\n{told}\nG1 Y14.5 F1500\nZ-2\nX8\nX1 Y3\nM2\n"
     mill = machine()
     job = Candidates(_planned(text), CONTROLS["linuxcnc"], TOLERANCE)
-    for one in job.chords(1e-3, "chords"):
+    for one in job.chords(1e-3):
         out = readable(job.written(one)[0].decode())
         for start in STARTS:
             there, back = (path(each, mill, start, (0.0, 0.0, 60.0)) for each in (text, out))
@@ -80,7 +80,7 @@ def test_the_way_there_and_back_is_not_left_out(code: str) -> None:
     for there, back in ((13.7, 9.31), (14.2, 10.07), (12.9, 3.3)):
         text = f"G21 G90\nG0 X0 Y0\nG1 X6.1 F3000\n{code} X{there}\nX{back}\nX{there + 2.0}\nG1 Y5\nX1\n"
         job = Candidates(_planned(text), CONTROLS["grbl"], TOLERANCE)
-        (one,) = job.chords(1e-3, "chords")
+        (one,) = job.chords(1e-3)
         place = (STARTS[1], OFFSETS[1])
         out = job.written(one)[0].decode()
         assert alike(path(text, mill, *place), path(out, mill, *place), TOLERANCE)
@@ -105,7 +105,7 @@ def test_what_an_extruder_does_is_kept(control: str, extruder: str) -> None:
         program = planner.read_program(text=text, machine=printer, reading=Reading(extruder=extruder))
         plan = planner.plan(program, printer, method="kinematic")
         job = Candidates(plan, CONTROLS[control], TOLERANCE)
-        found = [*job.own(0.01), *job.chords(0.01, "chords")]
+        found = [*job.own(0.01), *job.chords(0.01)]
         chords += len(found) > 1
         for one in found:
             out = job.written(one)[0].decode()
@@ -123,7 +123,7 @@ def test_retractions_by_the_control_are_kept(control: str, noted: str) -> None:
     program = planner.read_program(text=text, machine=machine(), reading=Reading(extruder="ignore"))
     job = Candidates(planner.plan(program, machine(), method="stop"), CONTROLS[control], TOLERANCE)
     assert not job.why_not
-    (chords,) = job.chords(0.01, "chords")
+    (chords,) = job.chords(0.01)
     data, notes = job.written(chords)
     lines = [line.split(" F")[0] for line in data.decode().splitlines() if line[0] != ";"]
     assert lines[-5:-1] == ["G10", "G0 X20 Y5", "G11", "G1 X30 E2"]
@@ -175,7 +175,7 @@ def test_arcs_share_their_filament_along_the_way(control: str, extruder: bool, w
     """Filament against the way, by the control's own rules; ten times the filament, so that the tolerance is a tenth of it there."""
     text = ARCS.format(**words)
     job = _print(text, control, extruder=extruder)
-    for one in [*job.own(0.01), *job.chords(0.01, "chords")]:
+    for one in [*job.own(0.01), *job.chords(0.01)]:
         out = job.written(one)[0].decode()
         assert not unknown_words(out, control)
         assert "G2" not in {line.split(" ")[0] for line in out.splitlines()}

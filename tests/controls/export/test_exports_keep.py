@@ -39,7 +39,7 @@ def exported(
 ) -> list[str]:
     """The lines of the planned path as chords, or of the program's "own" path, without comments and blanks."""
     job = Candidates(planned(text, machine, **reading), CONTROLS[control], TOLERANCE)
-    (one,) = job.chords(1e-3, "chords") if kind == "chords" else job.own(1e-3)
+    (one,) = job.chords(1e-3) if kind == "chords" else job.own(1e-3)
     lines = job.written(one)[0].decode().splitlines()
     return [line for line in lines if line and line[0] not in "(;"]
 
@@ -111,7 +111,7 @@ def test_steps_between_chords_begin_where_the_program_has_them_begin() -> None:
     text = "G21 G90\nG0 X0 Y0\nG1 X10 F2000\nY10\nG91\nG1 Z-1\nG90\nX20\nX20 Y0\nG92 X0\nG1 X5\nY4\nM2\n"
     plan = planner.plan(planner.read_program(text=text, machine=MACHINE), MACHINE, method="kinematic")
     job = Candidates(plan, CONTROLS["grbl"], TOLERANCE)
-    (one,) = job.chords(2e-3, "chords")
+    (one,) = job.chords(2e-3)
     lines = job.written(one)[0].decode().splitlines()
     step = next(k for k, line in enumerate(lines) if line.startswith("G91"))
     assert re.search(r"Y10( F[\d.]+)?$", lines[step - 1]), "the corner of the program"
@@ -303,7 +303,7 @@ def test_the_head_says_from_what_for_which_control_and_with_which_assumptions(tm
 def test_a_path_of_points_begins_with_a_move_to_its_start() -> None:
     points = planner.path(np.array([[0.0, 0, 0], [10, 0, 0], [10, 8, 1]]), [30.0, 30.0])
     job = Candidates(planner.plan(points, MACHINE, method="stop"), CONTROLS["klipper"], TOLERANCE)
-    (one,) = job.chords(1e-3, "chords")
+    (one,) = job.chords(1e-3)
     lines = job.written(one)[0].decode().splitlines()
     assert "G0 X0 Y0 Z0 F12000" in lines
     assert "it is no NC program" in job.why_not

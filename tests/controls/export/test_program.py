@@ -103,7 +103,7 @@ def test_the_program_as_it_is_has_its_vertices_and_chords_on_its_arcs(with_words
 )
 def test_other_words_stand_where_they_stood(with_words: Plan, control: str, said: list[str]) -> None:
     job = Candidates(with_words, CONTROLS[control], TOLERANCE)
-    text = job.written(job.chords(2e-3, "chords")[0])[0].decode()
+    text = job.written(job.chords(2e-3)[0])[0].decode()
     found = [re.match(r"G4 P[\d.]+|T2 M6|M3 S900|[GMT]\d+", row) for row in text.splitlines()[1:]]
     words = [one.group() for one in found if one and one.group() not in ("G21", "G17", "G90")]
     kept = [word for k, word in enumerate(words) if k == 0 or word != words[k - 1]]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import planner
 from planner.controls.export.program import write_program
-from planner.controls.timing.linuxcnc import BLOCKS, LAST, NORMAL, joined_moves, linuxcnc_time
+from planner.controls.timing.linuxcnc import BLOCKS, LAST, NORMAL, joined_moves, linuxcnc_times
 from planner.machine import Machine
 from planner.nc.program import Kind
 
@@ -31,6 +32,10 @@ MEASURED = {
     ("e_chips", 0.05, 0.0): 32.725,
     ("e_chips", 0.025, 0.025): 30.881,
 }
+
+
+def linuxcnc_time(*moves: Any) -> float:
+    return float(linuxcnc_times(*moves).sum())
 
 
 def time_of(points: np.ndarray, tolerance: float = 0.05, feed: float = 1e9) -> float:

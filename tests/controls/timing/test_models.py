@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import planner
-from planner.controls.timing.models import CONTROLS, Control, predicted_time
+from planner.controls.timing.models import CONTROLS, Control, predicted_times
 from planner.machine import Machine
 
 SHARED = Path(os.environ.get("PLANNER_SHARED", Path(__file__).resolve().parents[4] / "shared"))
@@ -25,6 +26,10 @@ PEERS = {
     "d_starspiral": (2.164, 2.663),
     "e_chips": (28.226, 31.264),
 }
+
+
+def predicted_time(*moves: Any) -> float:
+    return float(predicted_times(*moves).sum())
 
 
 def time_of(points: np.ndarray, control: Control, feed: float = 1e9) -> float:

@@ -17,9 +17,8 @@ from typer.core import TyperCommand, TyperGroup
 from planner.commands.compare import compare_command
 from planner.commands.control_time import time_command
 from planner.commands.export import export_command, pulses_command, report_command
-from planner.commands.fit import fit_command
 from planner.commands.info import expand_command, info_command
-from planner.commands.machine import import_file, init_file, list_machines, show_machine
+from planner.commands.machine import fit_command, import_file, init_file, list_machines, show_machine
 from planner.commands.plan import plan_command
 from planner.commands.smooth import smooth_command
 from planner.commands.studied import sweep_command, what_if_command
@@ -44,17 +43,14 @@ class PlainCommand(TyperCommand):
             (one.name in FIRST or one.param_type_name == "argument", one.get_help_record(ctx))
             for one in self.get_params(ctx)
         ]
-        parts = {"Options": [line for first, line in shown if first and line]}
-        parts["Advanced"] = [line for first, line in shown if not first and line]
-        if len(shown) <= LONG:
-            parts = {"Options": parts["Options"] + parts["Advanced"]}
+        needed, others = (
+            [line for first, line in shown if line and first is which] for which in (True, False)
+        )
+        parts = {"Options": needed, "Advanced": others} if len(shown) > LONG else {"Options": needed + others}
         for title, lines in parts.items():
             if lines:
-                formatter.write_paragraph()
-                formatter.write_heading(title)
-                formatter.indent()
-                formatter.write_dl(lines)
-                formatter.dedent()
+                with formatter.section(title):
+                    formatter.write_dl(lines)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """As in the base class; raises its UsageError with a message of ours."""

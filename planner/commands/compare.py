@@ -66,50 +66,43 @@ def compare_command(
     The exit code is 0 if one of them passed, 1 if none did, 3 if none ended with a motion, 2 if all refused
     the job.
     """
-    if force and output is None and report is None:
+    files = [file for file in (output, report) if file is not None]
+    if force and not files:
         raise InputError(
             "--force has no effect without a file to write; name one with -o FILE or --report FILE"
         )
     methods = parse_methods(method)
     from planner.nc.reader import read_program
-    from planner.report.comparison import (
-        SUFFIXES,
-        about_job,
-        comparison_dict,
-        comparison_table,
-        write_comparison,
-    )
+    from planner.report import comparison
     from planner.report.replace import check_file, write_whole
     from planner.report.tables import assumed_lines
 
     inputs = [job, Path(machine or options.DEFAULT_MACHINE)]
     if output is not None:
-        check_file(output, inputs, suffixes=SUFFIXES, force=force)
+        check_file(output, inputs, suffixes=comparison.SUFFIXES, force=force)
     if report is not None:
         check_file(report, inputs, force=force)
     limits = machine_named(machine)
     program = read_program(job, limits, reading)
     rows = [_run(name, program, limits, tolerance, quiet, report is not None) for name in methods]
-    about = about_job(str(job), limits, tolerance)
+    about = comparison.about_job(str(job), limits, tolerance)
     if report is not None:
         from planner.report.html.comparison_page import comparison_page
 
         write_whole(report, comparison_page(rows, str(job), limits, program))
     if output is not None:
-        write_comparison(output, rows, about)
+        comparison.write_comparison(output, rows, about)
     if as_json:
-        say_json(comparison_dict(rows, about))
+        say_json(comparison.comparison_dict(rows, about))
     else:
         title = f"{job}: {len(rows)} methods, machine {limits.name}"
-        show(*assumed_lines(program.assumptions), comparison_table(rows, title))
-        for file in (output, report):
-            if file is not None:
-                say(str(file))
+        show(*assumed_lines(program.assumptions), comparison.comparison_table(rows, title))
+        for file in files:
+            say(str(file))
     outcomes = {row.outcome for row in rows}
-    if "passed" not in outcomes:
-        raise typer.Exit(
-            FAILED if "failed" in outcomes else NOT_SOLVED if "not solved" in outcomes else BAD_INPUT
-        )
+    closest = {"passed": 0, "failed": FAILED, "not solved": NOT_SOLVED, "refused": BAD_INPUT}
+    if code := next(code for outcome, code in closest.items() if outcome in outcomes):
+        raise typer.Exit(code)
 
 
 def parse_methods(text: str) -> list[str]:

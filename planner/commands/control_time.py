@@ -30,14 +30,7 @@ ROWS = 20  # of a table at most, the longest ones; --json has all
 def time_command(
     job: options.Job,
     machine: options.MachineOption = None,
-    control: Annotated[
-        str | None,
-        typer.Option(
-            "--control",
-            metavar="NAME",
-            help="linuxcnc, grbl, klipper or marlin (default: that of the machine)",
-        ),
-    ] = None,
+    control: Annotated[str | None, options.control_option(" (default: that of the machine)")] = None,
     tolerance: options.ToleranceOption = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="plan the motion too, and predict what export would bring")
@@ -90,11 +83,8 @@ def _planned(
         except InputError as fault:  # what it has no words for
             say(f"note: nothing to export: {fault}", err=True)
     assert made.trajectory is not None
-    return {
-        "tolerance_mm": LESS * allowed,
-        "cycle_time_s": made.trajectory.cycle_time,
-        "exported_s": predicted,
-    }
+    time = made.trajectory.cycle_time
+    return {"tolerance_mm": LESS * allowed, "cycle_time_s": time, "exported_s": predicted}
 
 
 def _show(found: ControlTimes, said: dict[str, Any]) -> None:
@@ -102,9 +92,8 @@ def _show(found: ControlTimes, said: dict[str, Any]) -> None:
     from planner.report.tables import pairs_table
 
     table = pairs_table()
-    table.add_row(
-        f"{found.control} takes", f"{found.seconds:.4g} s" if found.seconds < 1 else _clock(found.seconds)
-    )
+    takes = f"{found.seconds:.4g} s" if found.seconds < 1 else _clock(found.seconds)
+    table.add_row(f"{found.control} takes", takes)
     if found.dwells:
         table.add_row("of that standing still", f"{found.dwells:.4f} s")
     if said["beside_s"]:
@@ -118,10 +107,8 @@ def _show(found: ControlTimes, said: dict[str, Any]) -> None:
         if len(parts) > ROWS:
             table.add_row(f"  {len(parts) - ROWS} more {title}", "see --json")
     if made := said.get("plan"):
-        table.add_row(
-            f"planned within {made['tolerance_mm']:.4g} mm",
-            f"{made['cycle_time_s']:.4f} s, on drives that play setpoints",
-        )
+        played = f"{made['cycle_time_s']:.4f} s, on drives that play setpoints"
+        table.add_row(f"planned within {made['tolerance_mm']:.4g} mm", played)
         for name, seconds in made["exported_s"].items():
             table.add_row(f"exported, {name}", f"{seconds:.4f} s")
     show(table)

@@ -13,14 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from planner.base.errors import InputError
-from planner.commands.options import (
-    ForceOption,
-    JsonOption,
-    TrajectoryArgument,
-    UnitsOption,
-    length_option,
-    time_option,
-)
+from planner.commands import options
+from planner.commands.options import length_option, output_option, time_option
 from planner.commands.terminal import FAILED, guarded, say, say_json
 
 if TYPE_CHECKING:
@@ -68,9 +62,7 @@ def export_command(
             "grbl, klipper, marlin, linuxcnc: a program that its own planner runs well",
         ),
     ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="new directory for the files")
-    ],
+    output: Annotated[Path, output_option("DIR", "new directory for the files")],
     unit: Annotated[Unit, typer.Option("--unit", help="length unit of the files")] = Unit.mm,
     within: Annotated[
         float | None,
@@ -149,7 +141,8 @@ def export_command(
             text = f"a row every {periods * trajectory.dt * 1e3:g} ms, {shape} between them within {miss * 1e3:.2g} µm of the setpoints"
             if between != "cubic" and for_ not in STRAIGHT:
                 text += f'; the verdict is on interpolation = "{between}" between the setpoints'
-    _say_assumed(assumed if isinstance(assumed := read.metadata.get("assumptions"), list) else ())
+    assumed = read.metadata.get("assumptions")
+    _say_assumed(assumed if isinstance(assumed, list) else ())
     say(f"{output}: {text}")
 
 
@@ -219,22 +212,19 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
 
 @guarded
 def pulses_command(
-    trajectory: TrajectoryArgument,
+    trajectory: options.TrajectoryArgument,
     steps: Annotated[
         str, typer.Option(metavar="x=400,y=400", help="pulses per mm of each axis (rotary axes: per degree)")
     ],
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="file for the pulses (.parquet, .csv)"),
-    ] = None,
+    output: Annotated[Path | None, output_option("FILE", "file for the pulses (.parquet, .csv)")] = None,
     max_frequency: Annotated[
         float | None, typer.Option(metavar="HZ", help="highest pulse rate that the drives can take [1/s]")
     ] = None,
     pulse_width: Annotated[
         float | None, typer.Option(metavar="US", help="shortest high and low time of the step signal [us]")
     ] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.ForceOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Make step and direction pulses of a trajectory, at every instant within one pulse of it.
 
@@ -255,19 +245,14 @@ def pulses_command(
     trains = pulses_of(read.trajectory, wanted)
     faults = overrun(trains, drive)
     if output is not None and not faults:
-        about: dict[str, Any] = {
-            name: value for name, value in read.metadata.items() if name in ("run_id", "program")
-        }
-        write_pulses(output, trains, about)
+        write_pulses(output, trains, {n: v for n, v in read.metadata.items() if n in ("run_id", "program")})
     if as_json:
-        say_json({"axes": _figures(trains), "faults": faults})
+        say_json({"axes": {train.axis: _figures(train) for train in trains}, "faults": faults})
     else:
-        for axis, figures in _figures(trains).items():
-            rate = figures["highest_frequency_hz"]
-            say(
-                f"{axis}: {figures['pulses']:,} pulses, {figures['direction_changes']:,} changes of direction"
-                + (f", at most {rate:,.0f} per second" if rate is not None else "")
-            )
+        for train in trains:
+            rate = train.frequency_max
+            fastest = f", at most {rate:,.0f} per second" if rate is not None else ""
+            say(f"{train.axis}: {len(train):,} pulses, {train.changes:,} changes of direction{fastest}")
         for fault in faults:
             say(fault, err=True)
         if output is not None and not faults:
@@ -291,27 +276,21 @@ def parse_steps(text: str) -> dict[str, float]:
     return found
 
 
-def _figures(trains: tuple[AxisPulses, ...]) -> dict[str, dict[str, Any]]:
+def _figures(train: AxisPulses) -> dict[str, Any]:
     return {
-        train.axis: {
-            "steps": train.steps,
-            "pulses": len(train),
-            "direction_changes": train.changes,
-            "highest_frequency_hz": train.frequency_max,
-        }
-        for train in trains
+        "steps": train.steps,
+        "pulses": len(train),
+        "direction_changes": train.changes,
+        "highest_frequency_hz": train.frequency_max,
     }
 
 
 @guarded
 def report_command(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="directory that 'plan -o' wrote")],
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="page to write (default: DIR/report.html)"),
-    ] = None,
-    units: UnitsOption = None,
-    force: ForceOption = False,
+    output: Annotated[Path | None, output_option("FILE", "page to write (default: DIR/report.html)")] = None,
+    units: options.UnitsOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Write a page of a plan that opens in a browser: path, profiles, NC lines, corners, verdict."""
     if not os.path.isdir(directory):

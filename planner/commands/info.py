@@ -42,8 +42,7 @@ def expand_command(
     job: options.Job,
     machine: options.MachineOption = None,
     output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="the file to write (default: print the program)"),
+        Path | None, options.output_option("FILE", "the file to write (default: print the program)")
     ] = None,
     force: options.ForceOption = False,
     *,

@@ -112,7 +112,9 @@ def plan_many(
                 found = future.result()
                 done[found.job] = found
                 if not quiet:
-                    say(f"{found.job}: {_told(found)}", err=True)
+                    time = found.summary.get("cycle_time_s")
+                    took = "" if time is None else f"{time:.4f} s, "
+                    say(f"{found.job}: {took}{found.outcome}", err=True)
                 progress.count(len(done), len(jobs), 0)
         except KeyboardInterrupt:
             interrupted = True
@@ -171,11 +173,6 @@ def _end(tasks: Sequence[_Task]) -> None:
         for process in processes:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(ENDING)
-
-
-def _told(done: Done) -> str:
-    time = done.summary.get("cycle_time_s")
-    return done.outcome if time is None else f"{time:.4f} s, {done.outcome}"
 
 
 def _report(rows: Sequence[Done], as_json: bool) -> None:

@@ -60,6 +60,17 @@ def _choice(
     )
 
 
+def output_option(metavar: str, help_text: str) -> Any:
+    """The option -o of a command that writes: a FILE or a DIR."""
+    return typer.Option("-o", "--output", metavar=metavar, help=help_text)
+
+
+def control_option(more: str = "") -> Any:
+    """An option that takes the name of a control; `more` says when it is not needed."""
+    text = f"linuxcnc, grbl, klipper or marlin{more}"
+    return typer.Option("--control", metavar="NAME", help=text)
+
+
 def length_option(name: str, help_text: str) -> Any:
     """An option that takes a length above 0: in mm, or with a unit, such as 20um."""
     return _with_unit(name, help_text, "length", LENGTHS)

@@ -43,11 +43,8 @@ def plan_command(
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="DIR",
-            help="write the trajectory, the program with planned feeds and a summary into DIR",
+        options.output_option(
+            "DIR", "write the trajectory, the program with planned feeds and a summary into DIR"
         ),
     ] = None,
     file_format: Annotated[

@@ -30,7 +30,7 @@ _COMMENT = re.compile(rb"\([^)\n]*\)?|;[^\n]*")
 @options.takes_reading
 def smooth_command(
     job: options.Job,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="the file to write")],
+    output: Annotated[Path, options.output_option("FILE", "the file to write")],
     machine: options.MachineOption = None,
     tolerance: options.ToleranceOption = None,
     share: Annotated[

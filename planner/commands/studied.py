@@ -107,9 +107,7 @@ def what_if_command(
 @guarded
 @takes_studied_job
 def sweep_command(
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="where points, table and picture are kept")
-    ],
+    output: Annotated[Path, options.output_option("DIR", "where points, table and picture are kept")],
     vary: Annotated[
         list[str],
         typer.Option(
@@ -152,13 +150,7 @@ def sweep_command(
     varied = [parse_varied(text, studied.machine, studied.present_tolerance) for text in vary]
     for point in grid_of(varied)[:1]:
         studied.changed(point)
-    inputs = {
-        "program": studied.program.source,
-        "machine": studied.machine.name,
-        "tolerance_mm": studied.tolerance,
-        **studied.how,
-    }
-    folder = SweepFolder(output, studied, inputs)
+    folder = SweepFolder(output, studied)
     folder.open(force=force)
     with ProgressBar(quiet=quiet) as progress:
         done = sweep(studied, varied, folder, cluster, progress.count)

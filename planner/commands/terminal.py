@@ -67,38 +67,34 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     def run(*args: Any, **kwargs: Any) -> None:
         try:
             command(*args, **kwargs)
-        except InputError as fault:
-            say(str(fault), err=True)
-            raise typer.Exit(BAD_INPUT) from None
-        except NotSolvedError as fault:
-            say(f"not solved: {fault}", err=True)
-            raise typer.Exit(NOT_SOLVED) from None
-        except MemoryError as fault:
-            say(f"not solved: {memory_used_up(fault, judging)}", err=True)
-            raise typer.Exit(NOT_SOLVED) from None
-        except KeyboardInterrupt:
-            say("interrupted", err=True)
-            raise typer.Exit(INTERRUPTED) from None
+        except typer.Exit:
+            raise
         except BrokenPipeError:
             _drop_output()
             raise typer.Exit(BROKEN_PIPE) from None
-        except typer.Exit:
-            raise
-        except Exception as fault:
-            if is_of_memory(fault):
-                say(f"not solved: {memory_used_up(MemoryError(), judging)}", err=True)
-                raise typer.Exit(NOT_SOLVED) from None
-            import traceback
-
-            say(traceback.format_exc(), err=True)
-            say(
-                "This is a bug in planner, not in your program. Please report it with the lines above, "
-                "the NC program and the machine file.",
-                err=True,
-            )
-            raise typer.Exit(BUG) from None
+        except (Exception, KeyboardInterrupt) as fault:
+            code, text = _end_by(fault, judging)
+            say(text, err=True)
+            raise typer.Exit(code) from None
 
     return run
+
+
+def _end_by(fault: BaseException, judging: bool) -> tuple[int, str]:
+    """The exit code and the message for what ended a command."""
+    match fault:
+        case InputError():
+            return BAD_INPUT, str(fault)
+        case NotSolvedError():
+            return NOT_SOLVED, f"not solved: {fault}"
+        case KeyboardInterrupt():
+            return INTERRUPTED, "interrupted"
+    if is_of_memory(fault):
+        used_up = fault if isinstance(fault, MemoryError) else MemoryError()
+        return NOT_SOLVED, f"not solved: {memory_used_up(used_up, judging)}"
+    import traceback
+
+    return BUG, "".join(traceback.format_exception(fault)) + BUG_SAID
 
 
 def memory_used_up(fault: MemoryError, judging: bool = False) -> str:
@@ -201,6 +197,8 @@ def _room_for_a_library() -> bool:
     return True
 
 
+BUG_SAID = """
+This is a bug in planner, not in your program. Please report it with the lines above, the NC program and the machine file."""
 FAILED = 1  # planned, but the verdict failed
 BAD_INPUT = 2
 NOT_SOLVED = 3  # or out of memory

@@ -12,7 +12,7 @@ points do not belong to the same table.
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,16 +59,16 @@ def planned_point(job: StudiedJob, settings: Sequence[Setting]) -> dict[str, Any
 
 
 class SweepFolder:
-    """The directory of a sweep.
+    """The directory of a sweep of a job."""
 
-    job    : what is planned
-    inputs : the same in words, for `sweep.json`
-    """
-
-    def __init__(self, directory: Path, job: StudiedJob, inputs: Mapping[str, Any]):
-        self.directory = directory
-        self._points = directory / POINTS
-        self._about = {"inputs": json_ready(dict(inputs)), "digest": digest(job), "versions": versions()}
+    def __init__(self, directory: Path, job: StudiedJob):
+        self.directory, self._points = directory, directory / POINTS
+        said = {"program": job.program.source, "machine": job.machine.name, "tolerance_mm": job.tolerance}
+        self._about = {
+            "inputs": json_ready({**said, **job.how}),
+            "digest": digest(job),
+            "versions": versions(),
+        }
 
     def open(self, *, force: bool = False) -> bool:
         """Make the directory, or take up the sweep in it; True if there is one.
@@ -106,13 +106,8 @@ class SweepFolder:
         file = self._file(settings)
         row = _read(file) if file.exists() else None
         wanted = {setting.name: setting.value for setting in settings}
-        if (
-            row is None
-            or "outcome" not in row
-            or any(row.get(name) != value for name, value in wanted.items())
-        ):
-            return None
-        return row
+        whole = row is not None and "outcome" in row and row.items() >= wanted.items()
+        return row if whole else None
 
     def keep(self, settings: Sequence[Setting], row: dict[str, Any]) -> None:
         """Write the row of a point, whole or not at all. Raises InputError if it cannot be written."""

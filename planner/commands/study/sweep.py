@@ -88,9 +88,6 @@ def planned_here(job: StudiedJob, points: Sequence[Point]) -> Iterator[tuple[Poi
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     count = min(threads(), len(points))
-    if count <= 1:
-        yield from (_planned(job, point) for point in points)
-        return
     try:
         yield from Parallel(n_jobs=count, return_as="generator_unordered", batch_size=1)(
             delayed(_planned)(job, point) for point in points
@@ -203,18 +200,13 @@ def sweep_figure(done: Sweep, path: Path) -> None:
             lines = range(len(second.values)) if second is not None else [None]
             for k in _spread(lines, LINES_MAX):
                 where = (slice(None), *(() if k is None else (k,)), *at)
-                colour = matplotlib.colormaps["viridis"](
-                    0.0 if k is None else 0.9 * k / max(len(lines) - 1, 1)
-                )
+                colour = matplotlib.colormaps["viridis"](0.9 * (k or 0) / max(len(lines) - 1, 1))
                 label = None if k is None or second is None else f"{second.values[k]:.4g}"
-                axes.plot(
-                    first.values,
-                    np.where(failed[where], np.nan, time[where]),
-                    ".-",
-                    color=colour,
-                    label=label,
+                passed, missed = (
+                    np.where(failed[where] == which, time[where], np.nan) for which in (False, True)
                 )
-                axes.plot(first.values, np.where(failed[where], time[where], np.nan), "x", color=colour)
+                axes.plot(first.values, passed, ".-", color=colour, label=label)
+                axes.plot(first.values, missed, "x", color=colour)
             axes.set_xlabel(f"{first.name} [{first.unit or '-'}]")
             axes.set_ylabel("cycle time [s]")
             if max(first.values) >= LOG_FROM * min(first.values):

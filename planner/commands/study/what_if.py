@@ -99,10 +99,6 @@ class Forecast(NamedTuple):
     least: float
     most: float
 
-    def __add__(self, other: object) -> Forecast:
-        assert isinstance(other, Forecast)
-        return Forecast(self.least + other.least, self.most + other.most)
-
 
 def forecast(
     prices: PriceList | None, settings: Sequence[Setting], machine: Machine, tolerance: float
@@ -111,13 +107,9 @@ def forecast(
 
     tolerance : the present one [mm], NaN if there are several
     """
-    total = Forecast(0.0, 0.0)
-    for setting in settings:
-        found = None if prices is None else _of_one(prices, setting, machine, tolerance)
-        if found is None:
-            return None
-        total = total + found
-    return total
+    found = [None if prices is None else _of_one(prices, setting, machine, tolerance) for setting in settings]
+    known = [one for one in found if one is not None]
+    return Forecast(*map(sum, zip(*known, strict=True))) if len(known) == len(found) else None
 
 
 def _of_one(prices: PriceList, setting: Setting, machine: Machine, tolerance: float) -> Forecast | None:
@@ -154,8 +146,7 @@ def what_if_table(job: StudiedJob, rows: Sequence[WhatIf], title: str) -> Group:
     for it in rows:
         row, change = it.row, it.change if it.settings else None
         table.add_row(
-            _changes(job, it),
-            _present(job, it),
+            *_change_and_present(job, it),
             number_text(row.cycle_time, ".4f"),
             number_text(change, "+.4f"),
             foretold_text(it.foretold),
@@ -176,18 +167,14 @@ def foretold_text(foretold: Forecast | None) -> str:
     return least if least == most else f"{least} to {most}"
 
 
-def _changes(job: StudiedJob, it: WhatIf) -> str:
+def _change_and_present(job: StudiedJob, it: WhatIf) -> tuple[str, str]:
+    """What is changed in words, and the value that it has now."""
     if len(it.settings) != 1:
-        return it.label
+        return it.label, ""
     (setting,) = it.settings
-    return f"{setting} {unit_of(setting.name, job.machine)}".rstrip()
-
-
-def _present(job: StudiedJob, it: WhatIf) -> str:
-    if len(it.settings) != 1:
-        return ""
-    value = value_of(it.settings[0].name, job.machine, job.present_tolerance)
-    return "-" if value is None else "several" if value != value else f"{value:g}"
+    value = value_of(setting.name, job.machine, job.present_tolerance)
+    present = "-" if value is None else "several" if value != value else f"{value:g}"
+    return f"{setting} {unit_of(setting.name, job.machine)}".rstrip(), present
 
 
 def sweep_table(done: Sweep, title: str) -> Group:
@@ -204,34 +191,26 @@ def sweep_table(done: Sweep, title: str) -> Group:
             row = pick(passed, key=lambda each: each["cycle_time_s"])
             at = ", ".join(f"{one.name}={row[one.name]:g}" for one in done.varied)
             table.add_row(name, f"{row['cycle_time_s']:.4f} s at {at}")
-    reasons = Counter((row["outcome"], row["sentence"]) for row in done.rows if row["outcome"] != PASSED)
-    said = [
-        Text(f"{count:,} {outcome}: {sentence}")
-        for (outcome, sentence), count in reasons.most_common(REASONS_SHOWN)
-    ]
+    reasons = Counter(f"{row['outcome']}: {row['sentence']}" for row in done.rows if row["outcome"] != PASSED)
+    said = [f"{count:,} {reason}" for reason, count in reasons.most_common(REASONS_SHOWN)]
     if len(reasons) > REASONS_SHOWN:
-        said.append(Text(f"and {len(reasons) - REASONS_SHOWN:,} more reasons; {TABLE} has them all"))
-    return titled(title, table, *said)
+        said.append(f"and {len(reasons) - REASONS_SHOWN:,} more reasons; {TABLE} has them all")
+    return titled(title, table, *map(Text, said))
 
 
 def what_if_dict(job: StudiedJob, rows: Sequence[WhatIf]) -> dict[str, Any]:
     """Rows of `what_if`, ready for JSON."""
-    return json_ready(
+    said = [
         {
-            "program": job.program.source,
-            "machine": job.machine.name,
-            "rows": [
-                {
-                    "change": {setting.name: setting.value for setting in it.settings},
-                    "outcome": it.row.outcome,
-                    "sentence": it.row.sentence,
-                    "cycle_time_s": it.row.cycle_time,
-                    "change_s": it.change,
-                    "foretold_s": None if it.foretold is None else list(it.foretold),
-                    "contour_error_mm": it.row.contour_error,
-                    "planning_time_s": it.row.planning_time,
-                }
-                for it in rows
-            ],
+            "change": {setting.name: setting.value for setting in it.settings},
+            "outcome": it.row.outcome,
+            "sentence": it.row.sentence,
+            "cycle_time_s": it.row.cycle_time,
+            "change_s": it.change,
+            "foretold_s": it.foretold,
+            "contour_error_mm": it.row.contour_error,
+            "planning_time_s": it.row.planning_time,
         }
-    )
+        for it in rows
+    ]
+    return json_ready({"program": job.program.source, "machine": job.machine.name, "rows": said})

@@ -258,7 +258,7 @@ def test_a_cluster_goes_on_without_a_worker_that_is_killed(
     assert f"points   {count}: {count} passed" in said
     table = pq.read_table(out / "sweep.parquet").to_pydict()
     np.testing.assert_allclose(table["axes.x.jerk"], np.linspace(1e5, 2e5, count))
-    here = SweepFolder(tmp_path / "here", studied(), {})
+    here = SweepFolder(tmp_path / "here", studied())
     assert here.known([Setting(name="axes.x.jerk", value=1e5)]) is None
     own = planned_point(studied(), [Setting(name="axes.x.jerk", value=2e5)])
     assert own["cycle_time_s"] == pytest.approx(table["cycle_time_s"][-1], rel=1e-12)

@@ -79,9 +79,8 @@ def claims_of(readings: list[Observed], limits: Limits, names: Iterable[str], in
     if len(readings) == 1:
         known = dict.fromkeys(names, Known.SAMPLED) | dict.fromkeys((CONTOUR, VERTEX), Known.ASSUMED)
         bow = float(np.linalg.norm(limits.per_axis[1])) * readings[0].gap_max ** 2 / 8.0
-        return Claims(
-            known=MappingProxyType(known), open_mm=bow, between=f"{WAYS[interpolation]} from row to row"
-        )
+        way = f"{WAYS[interpolation]} from row to row"
+        return Claims(known=MappingProxyType(known), open_mm=bow, between=way)
     left_open, unknown, bent = readings[1].known[[OPEN, UNKNOWN, BENT]]
     # where jerk is not limited acceleration may jump, and the jerk is what periods show of that
     quantities = DERIVATIVES if limits.jerk_limited else DERIVATIVES[:2]
@@ -91,16 +90,11 @@ def claims_of(readings: list[Observed], limits: Limits, names: Iterable[str], in
         known |= {name: Known.CERTIFIED for name in known if name == "feed"}
     errors = Known.SAMPLED if unknown or bent else Known.CERTIFIED
     known |= dict.fromkeys((CONTOUR, VERTEX), errors)
-    return Claims(
-        known=MappingProxyType(known), open_mm=float(left_open) if errors is Known.CERTIFIED else None
-    )
+    open_mm = float(left_open) if errors is Known.CERTIFIED else None
+    return Claims(known=MappingProxyType(known), open_mm=open_mm)
 
 
 def _together(names: list[str]) -> list[str]:
     """Names of axes as one: velocity.x and velocity.y as velocity."""
-    return list(
-        dict.fromkeys(
-            name.partition(".")[0].replace("_", " ") if len(name.partition(".")[2]) <= 1 else name
-            for name in names
-        )
-    )
+    parts = [(name, *name.split(".", 1), "")[:3] for name in names]
+    return list(dict.fromkeys(what.replace("_", " ") if len(of) <= 1 else name for name, what, of in parts))

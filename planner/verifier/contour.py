@@ -18,7 +18,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
-from planner.verifier.excess import Excess, Fault, Kind, first_of, placed
+from planner.verifier.excess import Excess, Fault, Kind, first_of, of_place, placed
 from planner.verifier.findings import line_of
 from planner.verifier.matching import JUMPS, LAST, LOST_AFTER, NEAR_MISS, NOT_LOST, WORST_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces, widened
@@ -148,18 +148,14 @@ class Apart:
             ratio, distance, budget, time, _, _ = reading.match.worst.tolist()
             still = 1.0 if k else 0.0
             if distance > budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
-                found.append(_excess(Kind.CONTOUR, time, ratio * self.widened, still))
+                found.append(of_place(Kind.CONTOUR, time, ratio * self.widened, 2, still))
             near, times = self.near(reading), reading.match.passed["near_time"]
             for i in np.flatnonzero(np.nan_to_num(near) > self._allowed):
                 by = float(near[i] / self.pieces.joint["budget"][i])
                 own = float(self.near(self.readings[-1])[i] / self.pieces.joint["budget"][i])
                 still = own if len(self.readings) > 1 and np.isfinite(own) else 0.0
-                found.append(_excess(Kind.VERTEX, float(times[i]), by, still))
+                found.append(of_place(Kind.VERTEX, float(times[i]), by, 2, still))
         return found
-
-
-def _excess(kind: Kind, time: float, ratio: float, still: float) -> Excess:
-    return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=2, still=still)
 
 
 def apart(

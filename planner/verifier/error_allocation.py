@@ -39,7 +39,6 @@ the motion gains over it. It is no bound: other shapes within eps may be faster,
 turn at each of their corners.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 
@@ -51,7 +50,7 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.corners import CornerCheck
-from planner.verifier.excess import Excess, Fault, Kind, first_of, placed
+from planner.verifier.excess import Excess, Fault, Kind, first_of, of_place, placed
 from planner.verifier.filtered import bow_share
 from planner.verifier.limits import ACCELERATION, FEED_AT_REST, normal_limit
 from planner.verifier.matching import NEAR_MISS
@@ -114,7 +113,8 @@ def check_corners(
     delivered = speed_ratio, budget_ratio
     looked = miss <= NEAR_MISS * eps
     if motion is None or not len(corner):
-        looked &= _bow(machine, toolpath.axes, period) <= eps
+        most = float(np.linalg.norm(machine.limits("acceleration", toolpath.axes)))
+        looked &= most * period**2 / 8.0 <= eps  # the farthest that the axes can leave the chord of a period
     else:
         looked &= near[1]["near"] <= NEAR_MISS * eps
         when = near[1]["near_time"]
@@ -151,57 +151,40 @@ def check_corners(
 def faults(check: CornerCheck, axes: tuple[str, ...]) -> list[Fault]:
     """Corners that are passed too fast, and corners whose budget is overdrawn."""
     found: list[Fault] = []
-    for broken, values, kind, said in (
-        (check.too_fast & check.judged, check.speed_ratio, Kind.CORNER_SPEED, _too_fast),
-        (check.overdrawn, check.budget_ratio, Kind.CORNER_BUDGET, _overdrawn),
-    ):
-        worst = np.flatnonzero(broken)[np.argsort(-values[broken], kind="stable")]
-        found += first_of(worst, partial(_fault, check, values, kind, said, axes), "corners")
+    for kind, broken, ratio, *_ in _kinds(check):
+        worst = np.flatnonzero(broken)[np.argsort(-ratio[broken], kind="stable")]
+        found += first_of(worst, partial(_fault, check, ratio, kind, axes), "corners")
     return found
 
 
 def excesses(check: CornerCheck) -> list[Excess]:
     """Both, as data. A slower motion has less of a chord error, and misses the vertex by as much."""
-    found = []
-    for k in np.flatnonzero(check.too_fast & check.judged).tolist():
-        found.append(_excess(check, k, Kind.CORNER_SPEED, float(check.speed_ratio[k]), 1))
-    for k in np.flatnonzero(check.overdrawn).tolist():
-        still = float(check.miss[k] / check.budget[k])
-        found.append(_excess(check, k, Kind.CORNER_BUDGET, float(check.budget_ratio[k]), 2, still))
-    return found
+    return [
+        of_place(kind, float(check.time[k]), float(ratio[k]), power, float(still[k]))
+        for kind, broken, ratio, power, still in _kinds(check)
+        for k in np.flatnonzero(broken)
+    ]
 
 
-def _excess(check: CornerCheck, k: int, kind: Kind, ratio: float, power: int, still: float = 0.0) -> Excess:
-    time = float(check.time[k])
-    return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=power, still=still)
-
-
-def _fault(
-    check: CornerCheck,
-    values: FloatArray,
-    kind: Kind,
-    said: Callable[[CornerCheck, int], str],
-    axes: tuple[str, ...],
-    k: int,
-) -> Fault:
-    line, time = int(check.line[k]), float(check.time[k])
-    where = placed(axes, check.position[k])
-    found = f"{said(check, k)}, at the end of line {line}, {where}, t = {time:.6g} s"
-    return Fault(kind, kind.value, found, ratio=float(values[k]), time=time, line=line)
-
-
-def _too_fast(check: CornerCheck, k: int) -> str:
+def _kinds(check: CornerCheck) -> tuple[tuple[Kind, Array, FloatArray, int, FloatArray], ...]:
+    """Eq. (19) and (18): where they are broken and ratios, by which power of a slower pace these get less, and their part
+    that does not; (C,) each."""
     return (
-        f"passed at {check.feed_planned[k]:.6g} mm/s, {check.speed_ratio[k]:.7g} of what the axes' acceleration leaves a "
-        "motion of its curvature"
+        (Kind.CORNER_SPEED, check.too_fast & check.judged, check.speed_ratio, 1, np.zeros(len(check))),
+        (Kind.CORNER_BUDGET, check.overdrawn, check.budget_ratio, 2, check.miss / check.budget),
     )
 
 
-def _overdrawn(check: CornerCheck, k: int) -> str:
-    return (
-        f"missed by {check.budget_ratio[k] * check.budget[k]:.7g} mm with the chord error, {check.budget_ratio[k]:.7g} "
-        f"of the budget {check.budget[k]:.6g} mm"
-    )
+def _fault(check: CornerCheck, ratios: FloatArray, kind: Kind, axes: tuple[str, ...], k: int) -> Fault:
+    line, time, ratio = int(check.line[k]), float(check.time[k]), float(ratios[k])
+    if kind is Kind.CORNER_SPEED:
+        said = f"passed at {check.feed_planned[k]:.6g} mm/s, {ratio:.7g} of what the axes' acceleration leaves a motion of its "
+        said += "curvature"
+    else:
+        budget = check.budget[k]
+        said = f"missed by {ratio * budget:.7g} mm with the chord error, {ratio:.7g} of the budget {budget:.6g} mm"
+    found = f"{said}, at the end of line {line}, {placed(axes, check.position[k])}, t = {time:.6g} s"
+    return Fault(kind, kind.value, found, ratio=ratio, time=time, line=line)
 
 
 def _nearest_sample(
@@ -291,12 +274,6 @@ def _paper_speed(toolpath: Toolpath, corner: Array, machine: Machine) -> FloatAr
     X = np.minimum(allowed_across(across, toolpath.axes, machine), eps / (2.0 * rate))
     speed: FloatArray = np.sqrt(1.5 * X * (eps - rate * X)) / np.tan(toolpath.theta[corner] / 2.0)
     return speed
-
-
-def _bow(machine: Machine, axes: tuple[str, ...], period: FloatArray) -> FloatArray:
-    """The farthest that the axes can leave the chord of a period (C,) [mm]."""
-    bow: FloatArray = np.linalg.norm(machine.limits("acceleration", axes)) * period**2 / 8.0
-    return bow
 
 
 def _linear(axes: tuple[str, ...]) -> Array:

@@ -149,6 +149,11 @@ def above(ratio: FloatArray) -> FloatArray:
     return np.where(ratio > 1.0 + RATIO_ROUNDING, ratio, 0.0)
 
 
+def of_place(kind: Kind, time: float, ratio: float, power: int, still: float = 0.0) -> Excess:
+    """Of an error at one time [s]; the rest as of `Excess`."""
+    return Excess(kind=kind, name=kind.value, begin=time, end=time, ratio=ratio, power=power, still=still)
+
+
 def of_check(name: str, span: tuple[float, float], ratio: float) -> Excess:
     """Of a quantity, "jerk.e" for example, of which its largest ratio in the `span` [s] is known."""
     power = POWERS[NAMES.index(name.partition(".")[0])]

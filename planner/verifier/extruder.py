@@ -27,7 +27,7 @@ from planner.verifier.findings import check_of, joint_times
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import FEED_AT_REST, UNITS
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces
-from planner.verifier.stream import Observed
+from planner.verifier.stream import Observed, overlapping
 from planner.verifier.user_limits import along_path
 from planner.verifier.verdict import LimitCheck
 from planner.verifier.worst import COLUMN, ROUNDING_ULPS, SampleBlock, Worst, differences, less_error
@@ -35,7 +35,6 @@ from planner.verifier.worst import COLUMN, ROUNDING_ULPS, SampleBlock, Worst, di
 NEAR = 8.0  # within so many tolerances of way E is the programmed one where a joint is passed [-]
 REST = 1e-9  # axes that move less than this between samples rest [mm]
 PLACE_ROUNDING = 1e-6  # of E [mm of filament]: the digits that programs carry
-COLUMNS = ("t", "position", *DERIVATIVES, "extruder")
 CARRIED = 4  # samples that a chunk shares with the one before
 
 
@@ -60,7 +59,7 @@ def extruder_seen(
     if toolpath.extrusion is None:
         return ExtruderSeen()
     watch = _Watch(toolpath, joint_times(readings[0], pieces), given)
-    for chunk in trajectory.chunks():
+    for chunk in overlapping(trajectory, CARRIED):
         if not len(chunk.extruder):
             return ExtruderSeen(notes=("there is no column e: what the extruder does is not judged",))
         watch.take(chunk)
@@ -80,40 +79,16 @@ class _Watch:
         self.seen = np.full(len(fed.joint), np.nan)  # E where each joint is passed
         self.speed = np.zeros(len(fed.joint))  # and the speed there
         self.end, self.period = 0.0, 0.0
-        self._carried: list[FloatArray] = []  # of the chunk before
 
     def take(self, chunk: Trajectory) -> None:
-        """The next samples."""
-        before = self._carried
-        fresh = int(np.searchsorted(chunk.t, before[0][-1], side="right")) if before else 0
-        columns = [getattr(chunk, name)[fresh:] for name in COLUMNS]
-        if before:
-            columns = [np.concatenate(pair) for pair in zip(before, columns, strict=True)]
-        self._look(*columns)
-        self._carried = [column[-CARRIED:].copy() for column in columns]
-
-    def _look(
-        self,
-        t: FloatArray,
-        position: FloatArray,
-        velocity: FloatArray,
-        acceleration: FloatArray,
-        jerk: FloatArray,
-        columns: FloatArray,
-    ) -> None:
-        e = columns[:, 0]
+        """The next samples, behind the last ones of the chunk before."""
+        t, position, e = chunk.t, chunk.position, chunk.extruder[:, 0]
         off = ROUNDING_ULPS * np.spacing(np.abs(e).max(initial=1.0)) + self.given.extruder_rounding
         self.end = float(e[-1])
         if len(t) < 2:
             return
-        block = SampleBlock(
-            t=t,
-            position=position,
-            velocity=velocity,
-            acceleration=acceleration,
-            jerk=jerk,
-            piece=np.zeros(len(t), dtype=np.int64),
-        )
+        columns = {name: getattr(chunk, name) for name in ("t", "position", *DERIVATIVES)}
+        block = SampleBlock(**columns, piece=np.zeros(len(t), dtype=np.int64))
         h, chord = np.diff(t), np.linalg.norm(np.diff(position, axis=0), axis=1)
         self.period = max(self.period, float(h.max()))
         moved = np.maximum(np.abs(np.diff(e)) - 2.0 * off, 0.0)

@@ -167,12 +167,9 @@ def unvisited(
         here = np.unique(pieces.piece["segment"][left_out])
         if len(here):
             lines = list(dict.fromkeys(toolpath.line[here].tolist()))
-            shown = ", ".join(map(str, lines[:FAULTS_OF_A_KIND])) + (
-                " ..." if len(lines) > FAULTS_OF_A_KIND else ""
-            )
-            said.append(
-                _order(reading.noted(f"{len(here)} blocks are not run to their end, line {shown}"), lines[0])
-            )
+            shown = ", ".join(map(str, lines[:FAULTS_OF_A_KIND])) + " ..." * (len(lines) > FAULTS_OF_A_KIND)
+            left = f"{len(here)} blocks are not run to their end, line {shown}"
+            said.append(_order(reading.noted(left), lines[0]))
         if match.tally[HELD]:
             line = line_of(toolpath, pieces, int(match.tally[LOST_AFTER]))
             held = f"lost after line {line}: {match.tally[HELD]} places looked at are far from where the program should be"
@@ -210,40 +207,33 @@ def stop_faults(
     hurry = 2.0 * (1.0 - (1.0 - STOP_ROUNDING) / max(over, 1.0))
     said = []
     for reading in readings:
-        match = reading.match
-        stop_ratio = match.passed["stop_ratio"][joint]
-        visited = np.isfinite(stop_ratio)  # the others belong to blocks that are not run, which `order` names
-        through = np.flatnonzero(
-            (pieces.joint["stop"][joint] == 1) & visited & (stop_ratio > 1.0 + STOP_ROUNDING)
-        )
+        passed = reading.match.passed[joint]
+        ratio, rest = passed["stop_ratio"], passed["rest"]
+        visited = np.isfinite(ratio)  # the others belong to blocks that are not run, which `order` names
+        through = (pieces.joint["stop"][joint] == 1) & visited & (ratio > 1.0 + STOP_ROUNDING)
         # n periods are summed with one rounding each; the two beside the rest are known as well as a stop
         unknown = RATIO_ROUNDING * toolpath.dwell + hurry * reading.gap_max + 2.0 * limits.time_rounding
-        short = toolpath.dwell - match.passed["rest"][joint] > unknown
+        short = toolpath.dwell - rest > unknown
 
-        def stop_fault(i: int, reading: Observed = reading, ratios: FloatArray = stop_ratio) -> Fault:
-            by = f"{ratios[i]:.6g} of the speed or distance that a sample next to it can have"
-            found = f"no full stop at {_joint_name(toolpath, i)}: {reading.noted(by)}"
-            return Fault(Kind.STOP, "stop", found, ratio=float(ratios[i]), line=_line_before(toolpath, i))
+        def stop_fault(i: int, reading: Observed = reading, ratio: FloatArray = ratio) -> Fault:
+            by = reading.noted(f"{ratio[i]:.6g} of the speed or distance that a sample next to it can have")
+            return _at_joint(toolpath, i, "stop", f"no full stop at the {{}}: {by}", float(ratio[i]))
 
-        def dwell_fault(
-            i: int, reading: Observed = reading, rest: FloatArray = match.passed["rest"][joint]
-        ) -> Fault:
-            by = f"{rest[i]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
-            found = f"too short at {_joint_name(toolpath, i)}: {reading.noted(by)}"
-            return Fault(Kind.STOP, "dwell", found, line=_line_before(toolpath, i))
+        def dwell_fault(i: int, reading: Observed = reading, rest: FloatArray = rest) -> Fault:
+            by = reading.noted(f"{rest[i]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed")
+            return _at_joint(toolpath, i, "dwell", f"too short at the {{}}: {by}", None)
 
-        said += first_of(through, stop_fault, "such places")
+        said += first_of(np.flatnonzero(through), stop_fault, "such places")
         said += first_of(np.flatnonzero(short), dwell_fault, "such places")
     return said
 
 
-def _joint_name(toolpath: Toolpath, i: int) -> str:
+def _at_joint(toolpath: Toolpath, i: int, name: str, found: str, ratio: float | None) -> Fault:
+    """The fault of a stop at joint i, which its text names where it has {}."""
+    line = int(toolpath.line[max(i - 1, 0)])
     where = placed(toolpath.axes, toolpath.start[i] if i < len(toolpath) else toolpath.end[-1])
-    return f"the {'end' if i else 'start'} of line {_line_before(toolpath, i)}, {where}"
-
-
-def _line_before(toolpath: Toolpath, i: int) -> int:
-    return int(toolpath.line[max(i - 1, 0)])
+    text = found.format(f"{'end' if i else 'start'} of line {line}, {where}")
+    return Fault(Kind.STOP, name, text, ratio=ratio, line=line)
 
 
 def line_of(toolpath: Toolpath, pieces: ProgramPieces, piece: int) -> int:

@@ -35,11 +35,8 @@ class Given:
 
     def __post_init__(self) -> None:
         freeze(self, "position_rounding", float, (None,))
-        unknown = set(self.columns) - set(DERIVATIVES)
-        if unknown:
-            raise ValueError(
-                f"Given.columns: {', '.join(sorted(unknown))}; there are {', '.join(DERIVATIVES)}"
-            )
+        if unknown := ", ".join(sorted(set(self.columns) - set(DERIVATIVES))):
+            raise ValueError(f"Given.columns: {unknown}; there are {', '.join(DERIVATIVES)}")
 
 
 WHOLE = Given()

@@ -23,7 +23,7 @@ Program coordinates have the tool's length in z (G43), which turns with neither.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
@@ -31,13 +31,14 @@ from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Axis, KinematicsData, Machine
-from planner.motion.trajectory import Trajectory, joined
+from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, Kind
 from planner.verifier.findings import check_of
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.judge import verify
 from planner.verifier.limits import NORMAL_NAME, limits_of, look_at_axes, rows_of
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
+from planner.verifier.stream import overlapping
 from planner.verifier.verdict import LimitCheck, Verdict
 from planner.verifier.worst import BACK, SampleBlock, Worst
 
@@ -80,7 +81,7 @@ def verify_joints(
         not_limited=(*not_limited, NORMAL_NAME),
         progress=progress,
     )
-    gap = max((carried.gap(part) for part in _overlapping(setpoints, 1)), default=0.0)
+    gap = max((carried.gap(part) for part in overlapping(setpoints, 1)), default=0.0)
     limits = _joint_checks(setpoints, toolpath, machine, given, not_limited)
     broken = [check.fault(Kind.LIMIT, setpoints.axes) for check in limits.values() if check.broken]
     faults = [dataclasses.replace(fault, name=f"joint {fault.name}") for fault in broken]
@@ -159,15 +160,6 @@ class _Carried:
         return float(np.linalg.norm(middle - 0.5 * (at[1:] + at[:-1]), axis=1).max(initial=0.0))
 
 
-def _overlapping(setpoints: Trajectory, carried: int) -> Iterator[Trajectory]:
-    """The samples chunk by chunk, each after the first with the last `carried` ones before it."""
-    before: Trajectory | None = None
-    for chunk in setpoints.chunks():
-        whole = chunk if before is None else joined([before, chunk])
-        yield whole
-        before = whole.rows(np.arange(max(len(whole) - carried, 0), len(whole)))
-
-
 def _of_tip(machine: Machine) -> Machine:
     """The machine without limits of the tip's own coordinates."""
     linear = [machine.axes[letter] for letter in LINEAR_AXES]
@@ -185,7 +177,7 @@ def _joint_checks(
     limits = limits_of(machine, setpoints, given, not_limited)
     worst = Worst(rows_of(limits), len(limits.axes))
     travelled, skip = 0.0, 0
-    for part in _overlapping(setpoints, BACK):
+    for part in overlapping(setpoints, BACK):
         columns = {name: getattr(part, name) for name in ("t", "position", *DERIVATIVES)}
         piece = np.asarray(part.line, dtype=np.int64)  # the line itself
         block = SampleBlock(**columns, piece=piece, skip=skip, travelled=travelled)

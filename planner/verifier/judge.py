@@ -160,8 +160,5 @@ def _check_input(trajectory: Trajectory, toolpath: Toolpath, not_limited: tuple[
         )
     if not len(trajectory):
         raise InputError("the trajectory has no samples")
-    for name in not_limited:
-        if name not in NOT_LIMITED_NAMES:
-            raise ValueError(
-                f"not_limited: '{name}' is not known; allowed are {', '.join(NOT_LIMITED_NAMES)}"
-            )
+    for name in set(not_limited) - {*NOT_LIMITED_NAMES}:
+        raise ValueError(f"not_limited: '{name}' is not known; allowed are {', '.join(NOT_LIMITED_NAMES)}")

@@ -86,22 +86,15 @@ class Delivered:
     def take(self, chunk: Trajectory) -> None:
         """The next samples."""
         columns = {name: getattr(chunk, name) for name in ("t", "position", "velocity", "acceleration")}
-        before = {name: column[-1:] for name, column in self.ends.items()} or {
-            name: column[:0] for name, column in columns.items()
-        }
-        t = np.concatenate([before["t"], columns["t"]])
-        self.run += float(
-            np.linalg.norm(
-                np.diff(np.concatenate([before["position"], columns["position"]]), axis=0), axis=1
-            ).sum()
-        )
+        before = self.ends or {name: column[:0] for name, column in columns.items()}
+        t, position = (np.concatenate([before[name][-1:], columns[name]]) for name in ("t", "position"))
+        self.run += float(np.linalg.norm(np.diff(position, axis=0), axis=1).sum())
         when, periods = np.append(self._last[0], t[:-1]), np.append(self._last[1], np.diff(t))
         self._last = when[-1:], periods[-1:]
         off = periods - self.dt if self.longest is None else np.maximum(periods - JITTER * self.longest, 0.0)
         self._judge(when[:-1], off[:-1], periods[:-1])
         for name, column in columns.items():
-            have = self.ends.get(name, column[:0])
-            seen = np.concatenate([have, column])
+            seen = np.concatenate([before[name], column])
             self.ends[name] = seen if len(seen) <= 4 else np.concatenate([seen[:2], seen[-2:]])
 
     def _judge(self, when: FloatArray, off: FloatArray, periods: FloatArray, more: float = 0.0) -> None:

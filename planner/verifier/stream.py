@@ -4,14 +4,14 @@ The limits need to know the block of the path under each sample, so the matching
 first. Three samples are carried over from block to block, for the third differences.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory, joined
 from planner.verifier.between import UNKNOWN, look_between, nothing_between
 from planner.verifier.feed import Feeds
 from planner.verifier.given import DERIVATIVES
@@ -166,6 +166,15 @@ class Watch:
     def finish(self) -> None:
         """No more samples: judge what had to wait for them."""
         self._feeds.finish()
+
+
+def overlapping(trajectory: Trajectory, carried: int) -> Iterator[Trajectory]:
+    """The samples chunk by chunk, each after the first with the last `carried` ones before it."""
+    before: Trajectory | None = None
+    for chunk in trajectory.chunks():
+        whole = chunk if before is None else joined([before, chunk])
+        yield whole
+        before = whole.rows(np.arange(max(len(whole) - carried, 0), len(whole)))
 
 
 Each = Callable[[FloatArray, FloatArray, Located], None]

@@ -52,7 +52,9 @@ def look_at_user_limits(block: SampleBlock, limits: Limits, worst: Worst, first:
                 value, bound = np.abs(rates[order]), bounds[:, order]
                 worst.take(row + order, value[:, None], bound[:, None], COLUMN, block, span=order)
         if q is None:  # of the length the chord alone is known, which is shorter
-            seen = [_chord_speed(block, error)]
+            chord = np.linalg.norm(np.diff(block.position, axis=0, prepend=block.position[:1]), axis=1)
+            certain = np.maximum(chord - 2.0 * np.linalg.norm(error, axis=1), 0.0)
+            seen = [(certain / np.diff(block.t, prepend=-np.inf))[:, None]]
         else:
             q = np.broadcast_to(np.asarray(q, dtype=np.float64), len(block.t))
             off = _value_error(limit, limits.axes, block, direction, error, q)
@@ -80,13 +82,6 @@ def along_path(block: SampleBlock, *, delivered: bool) -> tuple[FloatArray, Floa
     normal = a - along[:, None] * t
     turning = np.einsum("nk,nk->n", normal, normal) / np.where(moving, speed, np.inf)
     return np.stack([speed, along, np.einsum("nk,nk->n", j, t) + turning]) * moving, t
-
-
-def _chord_speed(block: SampleBlock, error: FloatArray) -> FloatArray:
-    """(n, 1) length of each chord, less its error, over its period."""
-    chord = np.linalg.norm(np.diff(block.position, axis=0, prepend=block.position[:1]), axis=1)
-    mean = np.maximum(chord - 2.0 * np.linalg.norm(error, axis=1), 0.0) / np.diff(block.t, prepend=-np.inf)
-    return mean[:, None]
 
 
 def _rates(limit: Any, axes: tuple[str, ...], block: SampleBlock) -> FloatArray:

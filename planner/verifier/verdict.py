@@ -175,21 +175,15 @@ class Verdict:
 
     def summary(self) -> dict[str, Any]:
         """The part `verdict` of `summary.json`."""
-        after = self.after_filters
-        behind = (
-            {}
-            if after is None
-            else {
-                "contour_error_after_filters_mm": after.contour_error_mm,
-                "vertex_error_after_filters_mm": after.vertex_error_mm,
-            }
-        )
+        more: dict[str, float | None] = {}
+        if (after := self.after_filters) is not None:
+            more["contour_error_after_filters_mm"] = after.contour_error_mm
+            more["vertex_error_after_filters_mm"] = after.vertex_error_mm
         if self.linear_error_mm is not None:
-            behind |= {"linear_error_mm": self.linear_error_mm, "angle_error_deg": self.angle_error_deg}
+            more |= {"linear_error_mm": self.linear_error_mm, "angle_error_deg": self.angle_error_deg}
         if self.threads:
-            worst = max(self.threads, key=lambda thread: thread.ratio)
-            behind["thread_error_mm"] = worst.error_mm
-        return behind | {
+            more["thread_error_mm"] = max(self.threads, key=lambda thread: thread.ratio).error_mm
+        return more | {
             "passed": self.passed,
             "limits": {name: check.ratio for name, check in self.limits.items()},
             "known": self.claims.summary(),

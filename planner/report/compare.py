@@ -193,13 +193,8 @@ def _after_filters(verdict: Verdict) -> float | None:
 
 
 def _ringing(verdict: Verdict) -> float | None:
-    after = [
-        amplitude
-        for mode in verdict.ringing
-        for axis, amplitude in zip(mode.axes, mode.after, strict=True)
-        if axis in LINEAR_AXES
-    ]
-    return float(max(after)) if after else None
+    pairs = (pair for mode in verdict.ringing for pair in zip(mode.axes, mode.after.tolist(), strict=True))
+    return max((amplitude for axis, amplitude in pairs if axis in LINEAR_AXES), default=None)
 
 
 def best_of(rows: list[Row]) -> Row | None:

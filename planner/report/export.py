@@ -73,19 +73,19 @@ def write_plan(
     run_id = uuid.uuid4().hex
     beside = program_to_keep(plan)
     kept = {name for name in (PLANNED, *beside) if _is_source(plan, directory / name)}
-    kept |= {name for name, text in beside.items() if _is_users_own(directory / name, text)}
+    for name, text in beside.items():  # the user's own, which no run wrote
+        there = directory / name
+        kept |= {name} if there.is_file() and there.read_bytes() == text and not is_ours(there) else set()
     with replacing(directory, kept=kept, force=force) as new:
         about = trajectory_metadata(plan, run_id)
         trajectory, blocks, joints = plan.trajectory, None, joints_of(plan)
-        feed_of = WordFeed(plan.toolpath).of
+        file, feed_of = new / f"trajectory.{file_format}", WordFeed(plan.toolpath).of
         if isinstance(trajectory, TrajectoryOnDemand):  # evaluated once for both files
             watch = BlockWatch(plan.toolpath)
-            write_trajectory(
-                new / f"trajectory.{file_format}", trajectory.heard_by(watch.take), about, joints, feed_of
-            )
+            write_trajectory(file, trajectory.heard_by(watch.take), about, joints, feed_of)
             blocks = watch.planned(trajectory)
         else:
-            write_trajectory(new / f"trajectory.{file_format}", trajectory, about, joints, feed_of)
+            write_trajectory(file, trajectory, about, joints, feed_of)
         program, notes = _planned(plan, directory, blocks)
         if program is not None:
             (new / PLANNED).write_bytes(program)
@@ -95,24 +95,16 @@ def write_plan(
             from planner.report.plots import write_figures
 
             write_figures(plan, new, units)
+        said = {**summary(plan), "notes": [*plan.notes, *notes]}
         if report:
             from planner.report.html.page import REPORT, report_page
 
-            page = report_page(
-                plan, own_text(plan.program), {**summary(plan), "notes": [*plan.notes, *notes]}, units
-            )
+            page = report_page(plan, own_text(plan.program), said, units)
             (new / REPORT).write_text(page, encoding="utf-8")
         sums = checksums(new)
         names = sorted([SUMMARY, *sums])
-        said = {
-            **summary(plan),
-            "run_id": run_id,
-            "files": names,
-            "sha256": sums,
-            "notes": [*plan.notes, *notes],
-        }
-        in_words = json.dumps(said, indent=2, allow_nan=False)
-        (new / SUMMARY).write_text(in_words + "\n", encoding="utf-8")
+        said |= {"run_id": run_id, "files": names, "sha256": sums}
+        (new / SUMMARY).write_text(json.dumps(said, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return names
 
 
@@ -210,8 +202,3 @@ def _planned(plan: Plan, directory: Path, blocks: PlannedBlocks | None) -> tuple
 def _is_source(plan: Plan, file: Path) -> bool:
     """Whether the plan's program was read from that file, which must then not be replaced."""
     return file.exists() and Path(plan.program.source).resolve() == file.resolve()
-
-
-def _is_users_own(file: Path, text: bytes) -> bool:
-    """Whether a file that is to be kept is there already with that text, and no run wrote it."""
-    return file.is_file() and file.read_bytes() == text and not is_ours(file)

@@ -45,17 +45,13 @@ def plan_rows(plan: Plan) -> Rows:
             rows.append(("stopping at every block", times))
         if plan.least_time is not None:
             above = 100.0 * (time / plan.least_time - 1.0)
-            rows.append(
-                (
-                    "fastest possible",
-                    f"{plan.least_time:.4f} s or more, certified; this motion is {above:.2g} % above that",
-                )
-            )
+            said = f"{plan.least_time:.4f} s or more, certified; this motion is {above:.2g} % above that"
+            rows.append(("fastest possible", said))
         rows += beside_rows(plan.beside, time, float(plan.program.dwell.sum()))
     if plan.verdict is not None:
         rows += verdict_rows(plan.verdict)
     if plan.grid is not None:
-        rows.append(("held by", held_by_text(plan.grid)))
+        rows.append(("held by", ", ".join(f"{name} {percent} %" for name, percent in plan.grid.percents())))
     if plan.prices is not None and plan.trajectory is not None:
         rows += price_rows(plan.prices, plan.trajectory.cycle_time)
     if len(plan.program):
@@ -91,12 +87,13 @@ def smoothing(plan: Plan) -> str:
 def verdict_rows(verdict: Verdict) -> Rows:
     """Largest ratios to the limits, errors, corners, ringing, and whether it passed; where not, why."""
     rows: Rows = []
-    for quantity, checks in _by_quantity(verdict).items():
-        said = ", ".join(
-            f"{name.partition('.')[2] or ''} {ratio_text(check.ratio)}".strip() for name, check in checks
-        )
-        free = "" if all(check.limited for _, check in checks) else "  (not limited by this method)"
-        rows.append((f"{quantity.replace('_', ' ')} / limit", said + free))
+    ratios: dict[str, list[str]] = {}  # by what stands before the dot: velocity.x, velocity.y -> velocity
+    for name, check in verdict.limits.items():
+        quantity, _, axis = name.partition(".")
+        ratios.setdefault(quantity, []).append(f"{axis} {ratio_text(check.ratio)}".strip())
+    for quantity, said in ratios.items():
+        free = "  (not limited by this method)" if quantity in verdict.not_limited else ""
+        rows.append((f"{quantity.replace('_', ' ')} / limit", ", ".join(said) + free))
     rows.append(("contour error", _micrometres(verdict.contour_error_mm, verdict)))
     if verdict.linear_error_mm is not None:
         both = f"{verdict.linear_error_mm / MICROMETRE:.3f} µm in linear axes, {verdict.angle_error_deg:.4g}° in rotary ones"
@@ -124,9 +121,8 @@ def _ringing_text(mode: Ringing) -> str:
     """Amplitudes after the motion and peaks during it, axis by axis."""
 
     def said(values: FloatArray) -> str:
-        return ", ".join(
-            f"{axis} {value / MICROMETRE:.4g} µm" for axis, value in zip(mode.axes, values, strict=True)
-        )
+        pairs = zip(mode.axes, values, strict=True)
+        return ", ".join(f"{axis} {value / MICROMETRE:.4g} µm" for axis, value in pairs)
 
     return f"after the motion {said(mode.after)}; at most {said(mode.during)} during it"
 
@@ -136,14 +132,6 @@ def _micrometres(distance: float | None, verdict: Verdict) -> str:
     if distance is None:
         return f"not known: lost after line {verdict.lost_after}" if verdict.lost_after else "not known"
     return f"{distance / MICROMETRE:.3f} µm"
-
-
-def _by_quantity(verdict: Verdict) -> dict[str, list]:
-    """Limits grouped by what stands before the dot: velocity.x, velocity.y -> velocity."""
-    groups: dict[str, list] = {}
-    for name, check in verdict.limits.items():
-        groups.setdefault(name.partition(".")[0], []).append((name, check))
-    return groups
 
 
 def ratio_text(value: float) -> str:
@@ -163,11 +151,6 @@ SAVED_SHOWN = 5e-4  # what saves less of the cycle time is not worth a place in 
 MILLISECOND = 1e-3  # [s]
 NOTHING = "nothing"
 HINT = "a hint only"
-
-
-def held_by_text(grid: GridHistory) -> str:
-    """Active limits with their share of the time: "feed 98 %, jerk.y 41 %, ..."."""
-    return ", ".join(f"{name} {percent} %" for name, percent in grid.percents())
 
 
 def held_by_rows(grid: GridHistory, prices: PriceList | None) -> list[tuple[str, int, str]]:
@@ -306,9 +289,8 @@ def beside_summary(plan: Plan) -> dict[str, Any]:
     return {
         "dwell_s": float(plan.program.dwell.sum()),
         "counted": [
-            {"what": it.what, "count": it.count, "each_s": it.each, "because": it.because}
-            if it.each is None
-            else {"what": it.what, "count": it.count, "each_s": it.each}
+            {"what": it.what, "count": it.count, "each_s": it.each}
+            | ({"because": it.because} if it.each is None else {})
             for it in beside
         ],
         "known_s": seconds,

@@ -51,12 +51,10 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
 
     notes : printed below, without what `assumed_lines` says first; None for those of the plan
     """
-    title = f"{plan.program.source}: {plan.method}{smoothing(plan)}, machine {plan.machine.name}"
-    table = pairs_table()
-    _add(table, plan_rows(plan))
     first = set(plan.program.assumptions)
     said = [note for note in (plan.notes if notes is None else notes) if note not in first]
-    return titled(title, table, *(Text(f"note: {note}") for note in first_of(said, NOTES_SHOWN)))
+    below = [Text(f"note: {note}") for note in first_of(said, NOTES_SHOWN)]
+    return titled(_title(plan), _pairs(plan_rows(plan)), *below)
 
 
 def brief_table(
@@ -64,12 +62,14 @@ def brief_table(
 ) -> Group:
     """The plan in eight lines, as report/brief.py says; `notes` and what else it takes as there, None for those of
     the plan."""
-    table = pairs_table()
-    _add(table, brief_rows(plan, units, tolerance))
+    table = _pairs(brief_rows(plan, units, tolerance))
     above, below = note_lines(plan, plan.notes if notes is None else notes)
-    title = f"{plan.program.source}: {plan.method}{smoothing(plan)}, machine {plan.machine.name}"
     first = [Text(line, style="yellow") for line in above]
-    return Group(*first, titled(title, table, *map(Text, below)))
+    return Group(*first, titled(_title(plan), table, *map(Text, below)))
+
+
+def _title(plan: Plan) -> str:
+    return f"{plan.program.source}: {plan.method}{smoothing(plan)}, machine {plan.machine.name}"
 
 
 def assumed_lines(assumptions: Sequence[str], most: int = ASSUMED_SHOWN) -> list[Text]:
@@ -83,9 +83,7 @@ def verdict_table(verdict: Verdict, title: str, asked: dict[str, str] | None = N
 
     asked : name and text of the lines before it
     """
-    table = pairs_table()
-    _add(table, [*(asked or {}).items(), *verdict_rows(verdict)])
-    return titled(title, table)
+    return titled(title, _pairs([*(asked or {}).items(), *verdict_rows(verdict)]))
 
 
 def corners_table(corners: CornerCheck | None, units: Units = UNITS["mm"]) -> Table | None:
@@ -129,14 +127,12 @@ def info_table(info: ProgramInfo) -> Group:
     table = pairs_table()
     table.add_row("blocks", _counts(info.blocks))
     if info.full_circles or info.helices:
-        table.add_row(
-            "arcs among them", _counts({"full circles": info.full_circles, "helices": info.helices})
-        )
+        arcs = {"full circles": info.full_circles, "helices": info.helices}
+        table.add_row("arcs among them", _counts(arcs))
     for row in extent_rows(info.extent_min, info.extent_max, info.work_extent):
         table.add_row(*row)
-    table.add_row(
-        "length [mm]", ", ".join(f"{kind} {length:,.3f}" for kind, length in info.length.items() if length)
-    )
+    lengths = ", ".join(f"{kind} {length:,.3f}" for kind, length in info.length.items() if length)
+    table.add_row("length [mm]", lengths)
     if not np.isnan(info.feed[0]):
         low, high = (feed * SECONDS_PER_MINUTE for feed in info.feed)
         given = f"{low:g} to {high:g}, {info.feed_changes:,} changes"
@@ -156,17 +152,14 @@ def info_table(info: ProgramInfo) -> Group:
     if info.expansion is not None:
         table.add_row("expanded", _expanded(info.expansion))
     if (point := info.tool_point) is not None:
-        table.add_row(
-            "tool centre point", f"on by {point.word}, line {point.line}; a tool of {point.length:g} mm"
-        )
-    others = info.notes[len(info.assumptions) :]
-    below = [Text(f"note: {note}") for note in others]
+        said = f"on by {point.word}, line {point.line}; a tool of {point.length:g} mm"
+        table.add_row("tool centre point", said)
+    below = [Text(f"note: {note}") for note in info.notes[len(info.assumptions) :]]
     if info.unsupported:
         below += _unsupported(info.unsupported)
     elif info.assumptions:
-        below.append(
-            Text("nothing is refused; geometry and time hold if what is assumed above is so", style="yellow")
-        )
+        said = "nothing is refused; geometry and time hold if what is assumed above is so"
+        below.append(Text(said, style="yellow"))
     else:
         below.append(Text("every construct is supported", style="green"))
     return Group(*assumed_lines(info.assumptions, PLACES_SHOWN), Text(title, style="bold"), table, *below)
@@ -222,12 +215,13 @@ def machines_table(machines: Iterable[Machine]) -> Table:
     return table
 
 
-def _add(table: Table, rows: Iterable[tuple[str, str]]) -> None:
-    """Rows as they are, the verdict in its colour."""
+def _pairs(rows: Iterable[tuple[str, str]]) -> Table:
+    """A table of rows as they are, the verdict in its colour."""
+    table, styles = pairs_table(), {PASSED: "green", FAILED: "bold red"}
     for label, text in rows:
-        styles = {PASSED: "green", FAILED: "bold red"}
         style = styles.get(text.partition(";")[0], "") if label == VERDICT else ""
         table.add_row(Text(label), Text(text, style=style))
+    return table
 
 
 def _counts(counts: dict[str, int]) -> str:
@@ -292,17 +286,11 @@ def programs_table(rows: Sequence[tuple[str, str, Mapping[str, Any], str]]) -> G
             total += beside.get("total_s") or 0.0
             incomplete |= not beside.get("complete", True)
         elif text or summary:
-            told = (text or _why(summary)).splitlines()
+            faults = (summary.get("verdict") or {}).get("faults") or [summary.get("sentence")]
+            told = (text or str(faults[0] or "no reason was given")).splitlines()
             reason = "\n".join(told[-SAID_LINES:])
             said.append(Text(reason if reason.startswith(f"{name}:") else f"{name}: {reason}"))
     passed = sum(outcome == PASSED for _, outcome, _, _ in rows)
     words = f"{passed} of {len(rows)} programs passed: {time:.4f} s of motion{hours_text(time)}, {total:.4f} s in all"
     words += "; some of what they do beside the motion has no time in the machine file" if incomplete else ""
     return Group(table, Text(words), *said)
-
-
-def _why(summary: Mapping[str, Any]) -> str:
-    faults = (summary.get("verdict") or {}).get("faults") or [
-        summary.get("sentence") or "no reason was given"
-    ]
-    return str(faults[0])

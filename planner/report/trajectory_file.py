@@ -40,12 +40,13 @@ from planner.machine import EXTRUDER, LINEAR_AXES, ROTARY_AXES
 from planner.motion.pulses import AxisPulses
 from planner.motion.trajectory import Trajectory
 from planner.report.replace import PULSES, replacing_file
-from planner.report.trajectory_reader import CSV_METADATA, FORMATS, Format, read_trajectory
+from planner.report.trajectory_reader import CSV_METADATA, FORMATS, PREFIXES, Format, read_trajectory
 
 __all__ = ["FORMATS", "Format", "read_trajectory", "units", "write_trajectory"]
 
 Joints = Callable[[Trajectory], Trajectory]
 Feeds = Callable[[Trajectory], FloatArray]
+PER = ("", "/s", "/s2", "/s3")  # of the units of columns with these prefixes
 TIP = "tip_"  # before the names of the columns of the tool's tip
 ROW_GROUP = SIZES.row_group
 # Byte stream split puts the exponents of neighbouring samples side by side, and zstd at its fastest level then
@@ -95,8 +96,7 @@ def units(
     said = {"t": "s"}
     for axis in (*axes, EXTRUDER) if extruder else axes:
         length = "deg" if axis in ROTARY_AXES else "mm"
-        for prefix, per in zip(("", "v", "a", "j"), ("", "/s", "/s2", "/s3"), strict=True):
-            said[prefix + axis] = length + per
+        said |= {prefix + axis: length + per for prefix, per in zip(PREFIXES, PER, strict=True)}
     said |= {"s": "mm", "feed": feed, "line": "1", "block": "1"}
     return said | ({TIP + axis: "mm" for axis in LINEAR_AXES} if tip else {})
 
@@ -111,24 +111,13 @@ def trajectory_columns(
         tip = {TIP + axis: trajectory.position[:, trajectory.axes.index(axis)] for axis in LINEAR_AXES}
         return trajectory_columns(joints_of(trajectory)) | tip
     columns: dict[str, Array] = {"t": trajectory.t}
+    levels = (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.jerk)
     for k, axis in enumerate(trajectory.axes):
-        unit = trajectory.in_degrees[k] if axis in ROTARY_AXES else None
-        for prefix, values in zip(
-            ("", "v", "a", "j"),
-            (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.jerk),
-            strict=True,
-        ):
-            columns[prefix + axis] = values[:, k] if unit is None else values[:, k] * unit
+        unit = trajectory.in_degrees[k] if axis in ROTARY_AXES else 1.0
+        columns |= {prefix + axis: of[:, k] * unit for prefix, of in zip(PREFIXES, levels, strict=True)}
     if len(trajectory.extruder):
-        columns |= {
-            prefix + EXTRUDER: trajectory.extruder[:, k] for k, prefix in enumerate(("", "v", "a", "j"))
-        }
-    return columns | {
-        "s": trajectory.s,
-        "feed": trajectory.feed,
-        "line": trajectory.line,
-        "block": trajectory.block,
-    }
+        columns |= {prefix + EXTRUDER: trajectory.extruder[:, k] for k, prefix in enumerate(PREFIXES)}
+    return columns | {name: getattr(trajectory, name) for name in ("s", "feed", "line", "block")}
 
 
 def _groups(
@@ -159,16 +148,11 @@ def _table(columns: dict[str, Array]) -> Any:
     takes 0.4 s."""
     import pyarrow as pa
 
-    return pa.table(
-        {
-            name: pa.Array.from_buffers(
-                pa.from_numpy_dtype(column.dtype),
-                len(column),
-                [None, pa.py_buffer(np.ascontiguousarray(column))],
-            )
-            for name, column in columns.items()
-        }
-    )
+    def array(column: Array) -> Any:
+        buffers = [None, pa.py_buffer(np.ascontiguousarray(column))]
+        return pa.Array.from_buffers(pa.from_numpy_dtype(column.dtype), len(column), buffers)
+
+    return pa.table({name: array(column) for name, column in columns.items()})
 
 
 def _write_parquet(file: BinaryIO, groups: Iterator[dict[str, Array]], text: str) -> None:
@@ -211,11 +195,11 @@ def write_pulses(path: str | Path, trains: tuple[AxisPulses, ...], about: dict[s
     path = Path(path)
     if path.suffix not in SUFFIXES:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))
-    with replacing_file(path) as new:
-        _write(new, path.suffix, trains, about)
+    with replacing_file(path) as new, new.open("wb") as file:
+        _write(file, path.suffix, trains, about)
 
 
-def _write(path: Path, suffix: str, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:
+def _write(file: BinaryIO, suffix: str, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:
     import pyarrow as pa
     from pyarrow import csv, parquet
 
@@ -228,16 +212,10 @@ def _write(path: Path, suffix: str, trains: tuple[AxisPulses, ...], about: dict[
         columns[name] = np.concatenate([getattr(train, name) for train in trains])[order]
     table = pa.table(columns)
     if suffix == ".csv":
-        with path.open("wb") as file:
-            file.write((",".join(table.column_names) + "\n").encode())
-            csv.write_csv(table, file, csv.WriteOptions(include_header=False, quoting_style="none"))
+        file.write((",".join(table.column_names) + "\n").encode())
+        csv.write_csv(table, file, csv.WriteOptions(include_header=False, quoting_style="none"))
         return
     text = json.dumps(about | {"steps": {train.axis: train.steps for train in trains}}, allow_nan=False)
-    with path.open("wb") as file:
-        parquet.write_table(
-            table.replace_schema_metadata({"planner": text}),
-            file,
-            **PACKED,
-            use_dictionary=["axis", "direction", "line"],
-            use_byte_stream_split=["t"],
-        )
+    table = table.replace_schema_metadata({"planner": text})
+    packed: Any = PACKED | {"use_byte_stream_split": ["t"]}
+    parquet.write_table(table, file, use_dictionary=["axis", "direction", "line"], **packed)

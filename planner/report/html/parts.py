@@ -34,15 +34,21 @@ def page_of(
     Raises InputError if plotly is not installed.
     """
     kinds = {column_name: column.dtype.str.lstrip("<|") for column_name, column in columns.items()}
-    plotly, script = plotly_script(), template("shared.js") + template("view.js") + template(f"{name}.js")
+    # plotly's script, to be run by the page that it stands in
+    plotly = str(import_needed("plotly.offline", "a report").get_plotlyjs()).replace("</script", "<\\/script")
+    script = template("shared.js") + template("view.js") + template(f"{name}.js")
     parts = {
         "POLICY": policy(plotly, script),
         "TITLE": html.escape(Path(source).name),
         "KIND": kind,
         "STYLE": template("report.css"),
         "BODY": filled(template(f"{name}.html"), {**places, "PLOTLY": plotly}),
-        "ABOUT": json_text({**about, "columns": kinds}),
-        "COLUMNS": columns_text(columns),
+        # JSON may stand in a script element without "<"
+        "ABOUT": json.dumps({**about, "columns": kinds}, allow_nan=False).replace("<", "\\u003c"),
+        "COLUMNS": "\n".join(
+            f'<script type="text/plain" id="column-{column_name}">{packed(column)}</script>'
+            for column_name, column in columns.items()
+        ),
         "SCRIPT": script,
     }
     return readable(filled(template("frame.html"), parts))
@@ -52,10 +58,8 @@ def policy(*scripts: str) -> str:
     """The policy of a page for browsers: run these scripts, known by their SHA-256, and nothing else; show
     pictures that it has in it or draws itself; load nothing. Styles are free: plotly writes them into the
     page, and they run nothing."""
-    known = " ".join(
-        f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
-        for script in scripts
-    )
+    digests = (hashlib.sha256(script.encode()).digest() for script in scripts)
+    known = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
     return (
         f"default-src 'none'; script-src {known}; style-src 'unsafe-inline'; img-src data: blob:; "
         "base-uri 'none'; form-action 'none'"
@@ -67,30 +71,11 @@ def filled(page: str, parts: Mapping[str, str]) -> str:
     return "".join(parts.get(piece, piece) for piece in page.split("@@"))
 
 
-def columns_text(columns: Mapping[str, Array]) -> str:
-    """The `columns` of numbers, each (n,), as elements of a page."""
-    return "\n".join(
-        f'<script type="text/plain" id="column-{name}">{packed(column)}</script>'
-        for name, column in columns.items()
-    )
-
-
-def json_text(value: Any) -> str:
-    """JSON that may stand in a script element."""
-    return json.dumps(value, allow_nan=False).replace("<", "\\u003c")
-
-
 def packed(column: Array) -> str:
     """Bytes of a `column` (n,), compressed, as base64."""
     data = np.ascontiguousarray(column)
     little = data.astype(data.dtype.newbyteorder("<"), copy=False)
     return base64.b64encode(gzip.compress(little.tobytes(), LEVEL, mtime=0)).decode("ascii")
-
-
-def plotly_script() -> str:
-    """plotly's script, to be run by the page that it stands in. Raises InputError if plotly is not
-    installed."""
-    return str(import_needed("plotly.offline", "a report").get_plotlyjs()).replace("</script", "<\\/script")
 
 
 def template(name: str) -> str:

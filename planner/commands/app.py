@@ -49,8 +49,11 @@ class PlainCommand(TyperCommand):
         parts = {"Options": needed, "Advanced": others} if len(shown) > LONG else {"Options": needed + others}
         for title, lines in parts.items():
             if lines:
-                with formatter.section(title):
-                    formatter.write_dl(lines)
+                formatter.write_paragraph()
+                formatter.write_heading(title)
+                formatter.indent()
+                formatter.write_dl(lines)
+                formatter.dedent()
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """As in the base class; raises its UsageError with a message of ours."""

@@ -132,14 +132,11 @@ def _run(
 
     with ProgressBar(quiet=quiet) as progress:
         try:
-            row = row_of(
-                method,
-                program,
-                machine,
-                tolerance,
-                lambda stage, fraction: progress(f"{method}: {stage}", fraction),
-                SAMPLES_MAX if shown else 0,
-            )
+
+            def told(stage: str, fraction: float) -> None:
+                progress(f"{method}: {stage}", fraction)
+
+            row = row_of(method, program, machine, tolerance, told, SAMPLES_MAX if shown else 0)
         except MemoryError as fault:
             row = Row(method=method, outcome="not solved", sentence=memory_used_up(fault))
     took = "" if row.cycle_time is None else f" {row.cycle_time:.4f} s,"

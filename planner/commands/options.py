@@ -40,10 +40,10 @@ def _use_threads(count: int | None) -> int | None:
 
 
 def _choice(
-    name: str, check: Callable[[str], str], help_text: str, metavar: str = "NAME", known: Iterable[str] = ()
+    name: str, check: Callable[[str], str], known: Iterable[str], help_text: str, *, listed: bool = True
 ) -> Any:
-    """An option that takes a name that `check` knows; it may be an alias. `known` is what a shell offers."""
-    offered = [*known] or metavar.split("|")
+    """An option that takes a name that `check` knows; it may be an alias. `known` is what a shell offers, and what the
+    help has in the place of NAME where it is `listed`."""
 
     def parsed(text: str) -> str:
         try:
@@ -53,11 +53,16 @@ def _choice(
 
     return typer.Option(
         name,
-        metavar=metavar,
+        metavar="|".join(known) if listed else "NAME",
         parser=parsed,
         help=help_text,
-        autocompletion=lambda incomplete: [each for each in offered if each.startswith(incomplete)],
+        autocompletion=lambda incomplete: [each for each in known if each.startswith(incomplete)],
     )
+
+
+def _one_of(kind: str, known: tuple[str, ...], help_text: str) -> Any:
+    """An option --KIND that takes one of some names."""
+    return _choice(f"--{kind}", functools.partial(names.known_name, kind, names=known), known, help_text)
 
 
 def output_option(metavar: str, help_text: str) -> Any:
@@ -135,11 +140,10 @@ TrajectoryArgument = Annotated[
 ]
 UnitsOption = Annotated[
     str | None,
-    _choice(
-        "--units",
-        functools.partial(names.known_name, "units", names=("mm", "inch")),
+    _one_of(
+        "units",
+        ("mm", "inch"),
         "mm or inch, for what is shown (default: as in the program); feeds are per minute",
-        "mm|inch",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
@@ -172,12 +176,6 @@ def given_options(context: typer.Context, without: Container[str]) -> list[str]:
     return words
 
 
-def _one_of(kind: str, known: tuple[str, ...], help_text: str) -> tuple[Any, Any]:
-    """Type and option of a setting of the reader that takes one of some names."""
-    check = functools.partial(names.known_name, kind, names=known)
-    return str, _choice(f"--{kind}", check, help_text, "|".join(known))
-
-
 # The settings of the reader as options: name and type of the field of `Reading`, and the option.
 _READING: dict[str, tuple[Any, Any]] = {
     "strict": (bool, typer.Option("--strict", help="refuse whatever would be assumed in the program")),
@@ -189,17 +187,22 @@ _READING: dict[str, tuple[Any, Any]] = {
             help="leave out what you know to be harmless: codes, axes, commands, lines, such as M428,G187,A,$X,12-20",
         ),
     ),
-    "arc_centres": _one_of(
-        "arc-centres",
-        ARC_CENTRES,
-        "what I J K mean in a program without G90.1 and G91.1; auto: by what closes its arcs",
-    ),
-    "extruder": _one_of("extruder", EXTRUDERS, "what to do with the E words of a 3-D printer"),
-    "dialect": _one_of(
-        "dialect",
-        DIALECTS,
-        "whose language parameters, expressions, subprograms and dwells are; auto: by what the program holds",
-    ),
+    **{
+        kind.replace("-", "_"): (str, _one_of(kind, known, text))
+        for kind, known, text in (
+            (
+                "arc-centres",
+                ARC_CENTRES,
+                "what I J K mean in a program without G90.1 and G91.1; auto: by what closes its arcs",
+            ),
+            ("extruder", EXTRUDERS, "what to do with the E words of a 3-D printer"),
+            (
+                "dialect",
+                DIALECTS,
+                "whose language parameters, expressions, subprograms and dwells are; auto: by what the program holds",
+            ),
+        )
+    },
     "ignore_travel": (
         bool,
         typer.Option("--ignore-travel", help="plan what lies beyond the travel in the machine file"),
@@ -251,66 +254,30 @@ def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
     return taking(command, "reading", _READING, usual, gathered)
 
 
-# How a job is planned, as options: type of the value, and the option.
-_PLANNING: dict[str, tuple[Any, Any]] = {
-    "method": (
-        str,
-        _choice(
-            "--method",
-            names.method_name,
-            f"how to plan: {', '.join(names.METHODS)}",
-            known=names.METHODS,
-        ),
-    ),
-    "geometry": (
-        str | None,
-        _choice(
-            "--geometry",
-            names.geometry_name,
-            f"how {SHAPING} smooth the path: spline (the smoothest curve from stop to stop, then the feed on it), corners (each "
-            "corner by itself), or auto (path and feed together, where that runs; the default)",
-            "|".join(names.GEOMETRIES),
-        ),
-    ),
-    "corner": (
-        str | None,
-        _choice(
-            "--corner",
-            names.corner_name,
-            f"shape of single corners; implies --geometry {names.SINGLE_CORNERS} (default: {names.BEZIER})",
-            "|".join(names.CORNER_SHAPES),
-        ),
-    ),
-    "solver": (
-        str | None,
-        _choice(
-            "--solver",
-            names.solver_name,
-            "solver; the first is the method's default: "
-            + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
-            known=names.SOLVERS,
-        ),
-    ),
-    "effort": (
-        str | None,
-        _choice(
-            "--effort",
-            names.effort_name,
-            f"how much work: {', '.join(names.EFFORTS)}, default {names.NORMAL} ({' and '.join(names.users_of('effort'))})",
-            known=names.EFFORTS,
-        ),
-    ),
-    "smooth": (
-        float | None,
-        typer.Option(
-            "--smooth",
-            min=0.0,
-            metavar="WEIGHT",
-            help="weight of the jerk against the time: 0.03 for a smoother motion, 0.3 for a much slower one (default: 0, jerk small "
-            f"where it costs no time; {' and '.join(names.users_of('smooth'))})",
-        ),
-    ),
+# How a job is planned: what checks the name that an option takes, and the names that there are.
+_CHOICES: dict[str, tuple[Callable[[str], str], Iterable[str]]] = {
+    "method": (names.method_name, names.METHODS),
+    "geometry": (names.geometry_name, names.GEOMETRIES),
+    "corner": (names.corner_name, names.CORNER_SHAPES),
+    "solver": (names.solver_name, names.SOLVERS),
+    "effort": (names.effort_name, names.EFFORTS),
 }
+_HELP = {
+    "method": f"how to plan: {', '.join(names.METHODS)}",
+    "geometry": f"how {SHAPING} smooth the path: spline (the smoothest curve from stop to stop, then the feed on it), corners (each "
+    "corner by itself), or auto (path and feed together, where that runs; the default)",
+    "corner": f"shape of single corners; implies --geometry {names.SINGLE_CORNERS} (default: {names.BEZIER})",
+    "solver": "solver; the first is the method's default: "
+    + "; ".join(f"{name}: {', '.join(m.solvers)}" for name, m in names.METHODS.items() if m.solvers),
+    "effort": f"how much work: {', '.join(names.EFFORTS)}, default {names.NORMAL} ({' and '.join(names.users_of('effort'))})",
+    "smooth": "weight of the jerk against the time: 0.03 for a smoother motion, 0.3 for a much slower one (default: 0, jerk small "
+    f"where it costs no time; {' and '.join(names.users_of('smooth'))})",
+}
+# The same as options: type of the value, and the option.
+_PLANNING: dict[str, tuple[Any, Any]] = {
+    name: (str | None, _choice(f"--{name}", check, known, _HELP[name], listed=name in ("geometry", "corner")))
+    for name, (check, known) in _CHOICES.items()
+} | {"smooth": (float | None, typer.Option("--smooth", min=0.0, metavar="WEIGHT", help=_HELP["smooth"]))}
 
 
 def takes_planning(command: Callable[..., None]) -> Callable[..., None]:

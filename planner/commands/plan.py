@@ -121,15 +121,8 @@ def plan_command(
         check_file(trace, [job, Path(machine or options.DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
     with ProgressBar(quiet=quiet or verbose) as progress:
-        result = plan(
-            job,
-            machine_named(machine),
-            tolerance=tolerance,
-            reading=reading,
-            progress=progress,
-            log=steps if verbose or trace is not None else None,
-            **how,
-        )
+        how |= {"tolerance": tolerance, "reading": reading, "progress": progress}
+        result = plan(job, machine_named(machine), log=steps if verbose or trace is not None else None, **how)
         written: list[str] = []
         if output is not None and result.trajectory is not None:
             progress("write", 0.0)

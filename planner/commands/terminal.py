@@ -164,11 +164,8 @@ def show(*tables: RenderableType) -> None:
 
 # What loaders, threads and C++ say, in lower case.
 _SAID = (
-    "failed to map segment",
-    "cannot allocate memory",
-    "bad_alloc",
-    "can't start new thread",
-    "out of memory",
+    *("failed to map segment", "cannot allocate memory", "bad_alloc"),
+    *("can't start new thread", "out of memory"),
 )
 _LIBRARY = 256 << 20  # bytes: more than the largest library that planning loads (libllvmlite, 130 MB)
 

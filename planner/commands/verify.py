@@ -9,6 +9,7 @@ all the same.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -78,14 +79,8 @@ def verify_command(
     as_planned = reading == AS_USUAL
     program = read_program(job, limits, says.reading if as_planned else reading)
     with ProgressBar(quiet=quiet) as progress:
-        found = judge(
-            read,
-            program,
-            limits,
-            tolerance=tolerance if taken is None else taken,
-            not_limited=unjudged,
-            progress=lambda fraction: progress("verify", fraction),
-        )
+        allowed, told = tolerance if taken is None else taken, partial(progress, "verify")
+        found = judge(read, program, limits, tolerance=allowed, not_limited=unjudged, progress=told)
     verdict, budgets, time = found.verdict, found.toolpath.tolerance, found.motion.cycle_time
     notes = [*read.notes, *found.notes, *verdict.notes]
     notes += [f"the file says: {text}" for text in says.sentences(from_file, taken is not None, as_planned)]

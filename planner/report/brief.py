@@ -125,10 +125,8 @@ def _saved(plan: Plan, tolerance: float | None) -> str:
     if found is None:
         other, takes = "a stop at every block", plan.stop_time
     else:
-        other, takes = (
-            f"{NAMES.get(found.control, found.control)}'s own planner (our model of it)",
-            found.seconds,
-        )
+        other = f"{NAMES.get(found.control, found.control)}'s own planner (our model of it)"
+        takes = found.seconds
     if not np.isfinite(takes):
         return "not known"
     saved = takes - time

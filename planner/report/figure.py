@@ -125,22 +125,17 @@ def profile_panels(
     motion: MotionColumns, machine: Machine, axes: Sequence[str], quantities: Sequence[str], units: Units
 ) -> list[Panel]:
     """The feed, and below it `quantities` of the axes against the machine's limits."""
-    return [feed_panel(motion, units)] + [
-        Panel(
-            title=quantity,
-            series=tuple(
-                Series(
-                    name=axis,
-                    column=quantity[0] + axis,
-                    unit=("°" if axis in ROTARY_AXES else "mm") + QUANTITIES[quantity],
-                    colour=COLOURS[ALL_AXES.index(axis) % len(COLOURS)],
-                    limit=float(getattr(machine.axes[axis], quantity)),
-                )
-                for axis in axes
-            ),
+
+    def series(quantity: str, axis: str) -> Series:
+        unit = ("°" if axis in ROTARY_AXES else "mm") + QUANTITIES[quantity]
+        colour, limit = (
+            COLOURS[ALL_AXES.index(axis) % len(COLOURS)],
+            float(getattr(machine.axes[axis], quantity)),
         )
-        for quantity in quantities
-    ]
+        return Series(name=axis, column=quantity[0] + axis, unit=unit, colour=colour, limit=limit)
+
+    panels = [Panel(title=name, series=tuple(series(name, axis) for axis in axes)) for name in quantities]
+    return [feed_panel(motion, units), *panels]
 
 
 def moving_axes(motion: Trajectory) -> list[str]:

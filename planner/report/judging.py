@@ -120,13 +120,10 @@ class FileSays:
         """The metadata in words, and whether they were used."""
         settings = ", ".join(f"{name} {value}" for name, value in self.reading.changed().items())
         said = []
+        tolerance = self.tolerance and f"tolerance {self.tolerance:g} mm"
         for what, taken, instead in (
             (self.machine and f"machine {self.machine.get('name')}", machine_taken, "-m is given"),
-            (
-                self.tolerance and f"tolerance {self.tolerance:g} mm",
-                tolerance_taken,
-                "-m or --tolerance is given",
-            ),
+            (tolerance, tolerance_taken, "-m or --tolerance is given"),
             (settings and f"program read with {settings}", reading_taken, "the command line has its own"),
         ):
             if what:

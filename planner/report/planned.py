@@ -186,11 +186,6 @@ def _same(one: Program, other: Program, names: tuple[str, ...], within: float = 
         np.allclose(getattr(one.splines, n), getattr(other.splines, n), rtol=0.0, atol=within)
         for n in ("points", "weights")
     )
-    return (
-        splines
-        and len(one) == len(other)
-        and all(
-            np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name == "tolerance")
-            for name in names
-        )
-    )
+    pairs = {name: (getattr(one, name), getattr(other, name)) for name in names}
+    same = all(np.array_equal(*pair, equal_nan=name == "tolerance") for name, pair in pairs.items())
+    return splines and len(one) == len(other) and same

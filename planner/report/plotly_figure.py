@@ -116,18 +116,13 @@ def colourings(samples: Samples, units: Units) -> dict[str, dict[str, Any]]:
         ground: [[k / (len(shades) - 1), shade] for k, shade in enumerate(shades)]
         for ground, shades in LOW_TO_HIGH.items()
     }
-    feed, price = highest_feed(samples.feed, samples.programmed), samples.price
+    feed = highest_feed(samples.feed, samples.programmed)
     found = {}
+    dearest = 0.0 if samples.price is None else samples.price.max(initial=0.0)
     for column, title, scale, most, scales in (
         ("feed", f"feed [{units.feed}]", units.per_feed, feed, even),
         ("deviation", "deviation [µm]", 1.0 / MICROMETRE, samples.deviation.max(initial=0.0), even),
-        (
-            "price",
-            "saved [µs per µm]",
-            1e3,
-            0.0 if price is None else price.max(initial=0.0),
-            dict.fromkeys(even, dear),
-        ),
+        ("price", "saved [µs per µm]", 1e3, dearest, dict.fromkeys(even, dear)),
     ):
         if getattr(samples, column) is None:
             continue

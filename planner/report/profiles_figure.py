@@ -61,14 +61,10 @@ def profiles_figure(plan: Plan, units: Units) -> Figure:
     _feed_row(rows[0], motion, t, first)
     if band:
         handles = _band_row(rows[1], plan, scale)
+        title = "held by (share of the time, and what more of it saves)"
+        spacing: Any = {"title_fontsize": 8, "handlelength": 1.2, "columnspacing": 1.4}
         figure.legend(
-            handles=handles,
-            loc="outside upper center",
-            ncols=min(len(handles), 3),
-            title="held by (share of the time, and what more of it saves)",
-            title_fontsize=8,
-            handlelength=1.2,
-            columnspacing=1.4,
+            handles=handles, title=title, loc="outside upper center", ncols=min(len(handles), 3), **spacing
         )
     free = () if plan.verdict is None else plan.verdict.not_limited
     row = iter(rows[2 if band else 1 :])
@@ -115,17 +111,14 @@ def _band_row(panel: Axes, plan: Plan, scale: float) -> list[Patch]:
     assert trajectory is not None
     names, active = used_limits(grid.active_names, grid.active)
     held = held_by_rows(grid, plan.prices)[:HELD]
-    colour = {WORDS.get(name, name): one for name, one in zip(names, limit_colours(names), strict=True)}
+    shades = limit_colours(names)
+    colour = {WORDS.get(name, name): one for name, one in zip(names, shades, strict=True)}
     told = {name for name, _, _ in held}
     colours = [matplotlib.colors.to_rgb(one if name in told else LIGHT) for name, one in colour.items()]
     end = trajectory.cycle_time
     winner = majority(np.asarray(grid.t, dtype=float), active[:-1], len(names), end)
-    panel.imshow(
-        np.array(colours)[winner][None],
-        aspect="auto",
-        interpolation="nearest",
-        extent=(0.0, end * scale, 0.0, 1.0),
-    )
+    extent = (0.0, end * scale, 0.0, 1.0)
+    panel.imshow(np.array(colours)[winner][None], aspect="auto", interpolation="nearest", extent=extent)
     panel.set_yticks([])
     panel.spines[:].set_visible(False)
     panel.tick_params(bottom=False)

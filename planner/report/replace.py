@@ -33,14 +33,8 @@ SUMMARY = "summary.json"
 CSV_METADATA = "trajectory.meta.json"
 # Names that a run may write beside those of the program, in the order in which they take their places.
 OUTPUTS = (
-    CSV_METADATA,
-    "trajectory.parquet",
-    "trajectory.csv",
-    "trajectory.npz",
-    "planned.ngc",
-    "toolpath.png",
-    "profiles.png",
-    "report.html",
+    *(CSV_METADATA, "trajectory.parquet", "trajectory.csv", "trajectory.npz"),
+    *("planned.ngc", "toolpath.png", "profiles.png", "report.html"),
 )
 # The program among the files of a run. Those that it calls have any names: they are replaced, and never removed.
 PROGRAM = re.compile(r"program\.\w{1,8}")

@@ -96,15 +96,9 @@ def corners_table(corners: CornerCheck | None, units: Units = UNITS["mm"]) -> Ta
     worst = np.argsort(-closest, kind="stable")[:CORNERS_SHOWN]  # NaN, not looked at, comes last
     shown = f"the {len(worst):,} closest to eq. 18-19 of " if len(worst) < len(corners) else ""
     table = Table(title=f"{shown}{len(corners):,} corners", title_justify="left", box=None, pad_edge=False)
-    for name in (
-        "line",
-        "angle\ndeg",
-        f"feed\n{units.feed}",
-        "eq. 19\nfeed / its own",
-        "eq. 18\nerror / budget",
-        f"eq. 20\n{units.feed}",
-        "feed /\neq. 20",
-    ):
+    of_corner = ("line", "angle\ndeg", f"feed\n{units.feed}")
+    ratios = ("eq. 19\nfeed / its own", "eq. 18\nerror / budget", f"eq. 20\n{units.feed}", "feed /\neq. 20")
+    for name in (*of_corner, *ratios):
         table.add_column(name, justify="right")
     for k in sorted(worst):
         known = (
@@ -191,15 +185,8 @@ def _unsupported(faults: Sequence[Fault]) -> list[Text]:
 def machines_table(machines: Iterable[Machine]) -> Table:
     """Built-in machines and their main limits, axis by axis."""
     table = Table(box=None, pad_edge=False)
-    for name in (
-        "machine",
-        "dt\nms",
-        "tolerance\nmm",
-        "axes",
-        "velocity\nmm/s",
-        "acceleration\nmm/s²",
-        "jerk\nm/s³",
-    ):
+    limits = ("velocity\nmm/s", "acceleration\nmm/s²", "jerk\nm/s³")
+    for name in ("machine", "dt\nms", "tolerance\nmm", "axes", *limits):
         table.add_column(name, justify="left" if name in ("machine", "axes") else "right")
     for machine in machines:
         axes = [machine.axes[letter] for letter in machine.axes if letter in LINEAR_AXES]

@@ -227,7 +227,7 @@ def _assemble(
             base = max(level for level in there if level < order)
             lacking = [PREFIXES[order] + axis for axis in axes if PREFIXES[order] + axis not in columns]
             notes.append(f"{word} derived from the {_LEVELS[base]} (no column {', '.join(lacking)})")
-    position, velocity, acceleration, jerk = levels
+    position, velocity, *_ = levels
     linear = [k for k, axis in enumerate(axes) if axis not in ROTARY_AXES]
     fill: dict[str, Callable[[], Array]] = {
         "s": lambda: np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position[:, linear], axis=0), axis=1))),
@@ -238,17 +238,9 @@ def _assemble(
     said = {"s": "length of the polyline", "feed": "speed of the axes", "line": "unknown", "block": "unknown"}
     notes += [f"{name}: {said[name]} (no column {name})" for name in fill if name not in columns]
     rest: dict[str, Any] = {name: columns[name] if name in columns else make() for name, make in fill.items()}
-    trajectory = Trajectory(
-        axes=axes,
-        dt=float(np.median(np.diff(t))),
-        t=t,
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-        extruder=_extruder(columns, t),
-        **rest,
-    )
+    rest |= zip(("position", *DERIVATIVES), levels, strict=True)
+    dt = float(np.median(np.diff(t)))
+    trajectory = Trajectory(axes=axes, dt=dt, t=t, extruder=_extruder(columns, t), **rest)
     delivered = Given(
         columns=tuple(DERIVATIVES[order - 1] for order in there[1:]),
         position_rounding=tuple(rounding(columns[axis]) * inside[k] for k, axis in enumerate(axes)),

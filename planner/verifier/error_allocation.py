@@ -247,13 +247,8 @@ def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machin
     tangent = np.divide(velocity, feed[:, None], out=np.zeros_like(velocity), where=moves[:, None])
     across = acceleration - (acceleration * tangent).sum(axis=1)[:, None] * tangent
     normal = np.where(moves, np.linalg.norm(across, axis=1), 0.0)
-    return _Reading(
-        time=motion.t[rows],
-        feed=feed,
-        normal=normal,
-        allowed=allowed_across(across, motion.axes, machine),
-        distance=distance,
-    )
+    allowed = allowed_across(across, motion.axes, machine)
+    return _Reading(time=motion.t[rows], feed=feed, normal=normal, allowed=allowed, distance=distance)
 
 
 def allowed_across(direction: FloatArray, axes: tuple[str, ...], machine: Machine) -> FloatArray:

@@ -96,18 +96,10 @@ def _mean(x: FloatArray, v: FloatArray, h: float, T: float) -> tuple[FloatArray,
     w = behind - T / h
     p, q = x[:-behind], x[1 : len(x) - behind + 1]
     dp, dq = h * v[:-behind], h * v[1 : len(x) - behind + 1]
-    part = (
-        p * (w - w**3 + w**4 / 2)
-        + q * (w**3 - w**4 / 2)
-        + dp * (w**2 / 2 - 2 * w**3 / 3 + w**4 / 4)
-        + dq * (w**4 / 4 - w**3 / 3)
-    )
-    value = (
-        p * (1 - 3 * w**2 + 2 * w**3)
-        + q * (3 * w**2 - 2 * w**3)
-        + dp * (w - 2 * w**2 + w**3)
-        + dq * (w**3 - w**2)
-    )
+    part = p * (w - w**3 + w**4 / 2) + q * (w**3 - w**4 / 2)
+    part = part + dp * (w**2 / 2 - 2 * w**3 / 3 + w**4 / 4) + dq * (w**4 / 4 - w**3 / 3)
+    value = p * (1 - 3 * w**2 + 2 * w**3) + q * (3 * w**2 - 2 * w**3)
+    value = value + dp * (w - 2 * w**2 + w**3) + dq * (w**3 - w**2)
     mean = (integral[behind:] - integral[:-behind] - h * part) / T
     return mean + origin, (x[behind:] - value) / T
 

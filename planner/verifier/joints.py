@@ -96,9 +96,8 @@ def verify_joints(
         )
         faults.append(Fault(Kind.CONTOUR, "tip", found, ratio=None if error is None else error / tolerance))
     more, linear = 0.0 if error is None else gap, tip.linear_error_mm
-    contour = dataclasses.replace(
-        tip.contour, value=tip.contour.value + more, ratio=tip.contour.ratio + more / tolerance
-    )
+    value, ratio = tip.contour.value + more, tip.contour.ratio + more / tolerance
+    contour = dataclasses.replace(tip.contour, value=value, ratio=ratio)
     return dataclasses.replace(
         tip,
         passed=not faults and tip.passed,
@@ -142,14 +141,8 @@ class _Carried:
         """The motion of the tip, positions alone."""
 
         def of(samples: Trajectory) -> Trajectory:
-            nothing = np.zeros_like(samples.position)
-            return dataclasses.replace(
-                samples,
-                position=self.tips(samples.position),
-                velocity=nothing,
-                acceleration=nothing,
-                jerk=nothing,
-            )
+            tips, no = self.tips(samples.position), np.zeros_like(samples.position)
+            return dataclasses.replace(samples, position=tips, velocity=no, acceleration=no, jerk=no)
 
         return setpoints.through(of)
 

@@ -83,13 +83,8 @@ def _ringing(mode: Mode, state: FloatArray, axes: tuple[str, ...]) -> Ringing:
     w = 2.0 * math.pi * mode.frequency
     turn, decay = w * math.sqrt(1.0 - mode.damping**2), -mode.damping * w
     y, slope = state[:, DEFLECTION], state[:, SLOPE]
-    return Ringing(
-        frequency=mode.frequency,
-        damping=mode.damping,
-        axes=axes,
-        during=state[:, MOST],
-        after=np.hypot(y, (slope - decay * y) / turn),
-    )
+    most, after = state[:, MOST], np.hypot(y, (slope - decay * y) / turn)
+    return Ringing(frequency=mode.frequency, damping=mode.damping, axes=axes, during=most, after=after)
 
 
 @kernel()

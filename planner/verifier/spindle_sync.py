@@ -40,15 +40,9 @@ def thread_checks(
         return ()
     off = _out_of_step(trajectory, readings[0], toolpath, pieces, held, room_of(toolpath, machine, held))
     allowed = np.minimum(toolpath.tolerance[held], toolpath.tolerance[held + 1])
-    return tuple(
-        ThreadCheck(
-            line=int(toolpath.line[k]),
-            feed=float(toolpath.feed[k]),
-            error_mm=float(off[i]),
-            allowed_mm=float(allowed[i]),
-        )
-        for i, k in enumerate(held)
-    )
+    columns = (column.tolist() for column in (toolpath.line[held], toolpath.feed[held], off, allowed))
+    rows = zip(*columns, strict=True)
+    return tuple(ThreadCheck(line=k, feed=f, error_mm=error, allowed_mm=most) for k, f, error, most in rows)
 
 
 def thread_faults(threads: tuple[ThreadCheck, ...]) -> list[Fault]:

@@ -67,13 +67,9 @@ def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> 
     feed = np.maximum(np.maximum.reduceat(trajectory.feed, rows[:-1]), trajectory.feed[rows[1:]])
     block = trajectory.block[np.minimum(rows[:-1] + 1, rows[1:])]
     moves = (np.diff(points, axis=0) != 0).any(axis=1)
-    kept = np.append(True, moves)
+    points, feed, block = points[np.append(True, moves)], feed[moves], block[moves]
     return Polyline(
-        points=points[kept],
-        feed=feed[moves],
-        block=block[moves],
-        rapid=plan.program.kind[block[moves]] == Kind.RAPID,
-        miss=miss,
+        points=points, feed=feed, block=block, rapid=plan.program.kind[block] == Kind.RAPID, miss=miss
     )
 
 

@@ -38,27 +38,21 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
     shown = {k: row.shown for k, row in enumerate(rows) if row.shown is not None}
     for k, samples in shown.items():
         columns |= _columns(samples, f"m{k}_")
-    panels = [
-        Panel(
-            title=title,
-            series=tuple(
-                Series(
-                    name=rows[k].method,
-                    column=name,
-                    unit=unit,
-                    scale=scale,
-                    colour=colours[k],
-                    before=f"m{k}_",
-                )
-                for k in shown
-            ),
+
+    def panel(title: str, column: str, unit: str, scale: float) -> Panel:
+        series = (
+            Series(
+                name=rows[k].method, column=column, unit=unit, scale=scale, colour=colours[k], before=f"m{k}_"
+            )
+            for k in shown
         )
-        for name, title, unit, scale in (
-            ("feed", "feed", units.feed, units.per_feed),
-            ("deviation", "distance", "µm", 1.0 / MICROMETRE),
-        )
-    ]
-    paths = [three(samples.shown) for samples in shown.values()]
+        return Panel(title=title, series=tuple(series))
+
+    feed = panel("feed", "feed", units.feed, units.per_feed)
+    panels = [feed, panel("distance", "deviation", "µm", 1.0 / MICROMETRE)]
+    points = (
+        np.concatenate([three(samples.shown) for samples in shown.values()] or [np.zeros((0, 3))]) / units.mm
+    )
     about = {
         "machine": machine.name,
         "blocks": len(program),
@@ -67,10 +61,8 @@ def comparison_page(rows: list[Row], source: str, machine: Machine, program: Pro
         "rows": json_ready([_row(row, best) for row in rows]),
         "against": AGAINST,
         "units": dataclasses.asdict(units),
-        "profile": panel_figure(panels, "t") if paths else None,
-        "view": fitted_scene(np.concatenate(paths) / units.mm, axis_titles(program, units))
-        if paths
-        else None,
+        "profile": panel_figure(panels, "t") if shown else None,
+        "view": fitted_scene(points, axis_titles(program, units)) if shown else None,
     }
     return page_of("comparison", "methods side by side", source, about, columns)
 

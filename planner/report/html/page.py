@@ -73,15 +73,8 @@ def report_page(
 
 # Columns of samples and of lines with other numbers than float32; `t` tells samples an hour from the start
 # apart.
-TYPES = {
-    "t": "f8",
-    "line": "i4",
-    "frame": "i4",
-    "limit": "u1",
-    "rapid": "u1",
-    "line_line": "i4",
-    "line_limit": "u1",
-} | dict.fromkeys(("tool", "operation", "layer"), "i4")
+TYPES = {"t": "f8", "limit": "u1", "rapid": "u1", "line_limit": "u1"}
+TYPES |= dict.fromkeys(("line", "frame", "line_line", "tool", "operation", "layer"), "i4")
 
 
 def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]]:

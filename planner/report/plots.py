@@ -1,10 +1,6 @@
 """Pictures of a plan, made for paper: fine lines at 200 dpi, units on every axis, colours that colour-blind
-readers tell apart.
-
-The tool path coloured by feed (report/plots.py), and the profiles over time against their limits
-(report/profiles_figure.py).
-
-The tool path coloured by feed (the scale of the page), over the programmed path.
+readers tell apart. The tool path here, coloured by feed on the scale of the page, over the programmed path; the
+profiles over time in profiles_figure.py.
 
 An hour of motion has millions of samples; of them one point is kept for each pixel that the motion passes.
 """

@@ -1,7 +1,5 @@
-"""Feed, acceleration and jerk over time against their limits, and which constraint limits when.
-
-A job of an hour has millions of samples and a picture some 1500
-columns: a profile keeps the least and the largest value of each column, so that no peak is lost.
+"""Feed, acceleration and jerk over time against their limits, and which constraint limits when. A picture has some 1500
+columns: a profile keeps the least and the largest value of each, so that no peak of millions of samples is lost.
 """
 
 from __future__ import annotations

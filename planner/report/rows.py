@@ -1,12 +1,7 @@
 """The rows on a plan and on a verdict: one list of labels and texts, which the terminal prints,
 `summary.json` holds under `told`, and the report and the card of a notebook show. Nothing else puts these
-figures into words.
-
-What a plan says beside its motion: the active limits, what more of them would save, and the corners where
-tolerance saves most.
-
-The figures come from sensitivity/activity.py and sensitivity/prices.py; here they become words for the
-terminal and numbers for `summary.json`.
+figures into words. Those of the active limits, of what more of them would save and of the corners where tolerance
+saves most come from sensitivity/activity.py and sensitivity/prices.py.
 """
 
 from __future__ import annotations

@@ -91,11 +91,16 @@ def parse_setting(text: str, machine: Machine, tolerance: float) -> Setting:
     Raises InputError for a name that is no setting, with one that is near, and for a value that is no
     positive number or has a unit of something else.
     """
+    name, value = _named(text, machine, "a value, such as axes.y.jerk=4e5 or tolerance=0.02")
+    return Setting(name=name, value=parse_value(name, value, machine, tolerance))
+
+
+def _named(text: str, machine: Machine, needed: str) -> tuple[str, str]:
+    """The setting that `NAME=...` names, and what stands behind it. Raises InputError, saying what is `needed`."""
     name, equals, value = text.partition("=")
     if not equals:
-        raise InputError(f"'{text}': write a name and a value, such as axes.y.jerk=4e5 or tolerance=0.02")
-    name = known_setting(name.strip(), machine)
-    return Setting(name=name, value=parse_value(name, value, machine, tolerance))
+        raise InputError(f"'{text}': write a name and {needed}")
+    return known_setting(name.strip(), machine), value
 
 
 def known_setting(name: str, machine: Machine) -> str:
@@ -201,12 +206,7 @@ def parse_varied(text: str, machine: Machine, tolerance: float) -> Varied:
 
     Raises InputError for a name that is no setting and for values that are none.
     """
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise InputError(
-            f"'{text}': write a name and a range, such as tolerance=0.005:0.1:10:log or y.jerk=1e5,2e5"
-        )
-    name = known_setting(name.strip(), machine)
+    name, value = _named(text, machine, "a range, such as tolerance=0.005:0.1:10:log or y.jerk=1e5,2e5")
     unit = unit_of(name, machine)
     if _DASHED.fullmatch(value):
         raise InputError(f"{text}: for a range write FIRST:LAST:COUNT, for single values A,B,C")

@@ -1,9 +1,8 @@
 """Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table
 and a picture.
 
-Who plans the points of a sweep: processes of this machine (joblib), or the workers of a Dask cluster.
-
-Both call `planned_point` with the same job and hand the rows back as they come; the process that asks writes
+The points are planned by processes of this machine (joblib), or by the workers of a Dask cluster. Both call
+`planned_point` with the same job and hand the rows back as they come; the process that asks writes
 the files, so that workers need no file system in common. A point whose worker died is given to another one:
 by Dask, up to `DEATHS` times; a local process that dies ends the sweep, and the points so far are kept.
 """

@@ -1,7 +1,5 @@
 """A job as it is, with each of some settings changed alone, and with all of them, planned again; beside what
-the prices of the first plan foretold (commands/study/what_if.py).
-
-What the prices of a plan (sensitivity/prices.py) say of other values of its settings, without planning again.
+the prices of the first plan foretold, without planning again.
 
 The price p = dT/d(ln L) of a limit, of the feed or of the tolerance is known, and what more of it saves,
 between a least and a most. Other values follow by the power law of sensitivity/prices.py: less of it costs p/n

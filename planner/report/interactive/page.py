@@ -1,9 +1,8 @@
 """The report of a plan (report/html) as an object: a notebook shows it, `save` writes it, `open` shows it in
 the browser.
 
-Figures of a plan to turn and to zoom (plotly), for notebooks: `plan.plot`.
-
-Of long motions a figure has `POINTS_MAX` samples, and the fastest between them (report/html/data.py).
+Figures of a plan to turn and to zoom (plotly), for notebooks: `plan.plot`. Of long motions a figure has `POINTS_MAX`
+samples, and the fastest between them (report/html/data.py).
 """
 
 from __future__ import annotations

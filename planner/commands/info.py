@@ -1,5 +1,6 @@
 """`planner info`: what a program holds."""
 
+import functools
 from pathlib import Path
 from typing import Annotated
 
@@ -37,7 +38,7 @@ def info_command(
 
 
 @guarded
-@options.takes_reading
+@functools.partial(options.takes_reading, caps=False)
 def expand_command(
     job: options.Job,
     machine: options.MachineOption = None,

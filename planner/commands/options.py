@@ -203,6 +203,14 @@ _READING: dict[str, tuple[Any, Any]] = {
             ),
         )
     },
+    "feed_caps": (
+        str | None,
+        typer.Option(
+            "--feed-caps",
+            metavar="FILE",
+            help="CSV of feeds that hold where they are below F: line,feed or file,line,feed or from_mm,to_mm,feed",
+        ),
+    ),
     "ignore_travel": (
         bool,
         typer.Option("--ignore-travel", help="plan what lies beyond the travel in the machine file"),
@@ -244,14 +252,18 @@ def taking(
     return run
 
 
-def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of the reader; it gets them as one argument, `reading`."""
+def takes_reading(command: Callable[..., None], *, caps: bool = True) -> Callable[..., None]:
+    """Give a command the options of the reader; it gets them as one argument, `reading`.
+
+    caps : with feed caps, which mean nothing to a command that writes a program's own words
+    """
+    options = {name: option for name, option in _READING.items() if caps or name != "feed_caps"}
 
     def gathered(given: dict[str, Any]) -> Reading:
         return Reading(**given | {"ignore": ignore_list(given["ignore"])})
 
-    usual = {name: "" if name == "ignore" else getattr(Reading(), name) for name in _READING}
-    return taking(command, "reading", _READING, usual, gathered)
+    usual = {name: "" if name == "ignore" else getattr(Reading(), name) for name in options}
+    return taking(command, "reading", options, usual, gathered)
 
 
 # How a job is planned: what checks the name that an option takes, and the names that there are.

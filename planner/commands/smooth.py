@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,7 +28,7 @@ _COMMENT = re.compile(rb"\([^)\n]*\)?|;[^\n]*")
 
 
 @guarded
-@options.takes_reading
+@functools.partial(options.takes_reading, caps=False)
 def smooth_command(
     job: options.Job,
     output: Annotated[Path, options.output_option("FILE", "the file to write")],

@@ -77,7 +77,7 @@ def verify_command(
     job = says.program_at(trajectory) if job is None else job
     taken = says.tolerance if machine is None and tolerance is None else None
     as_planned = reading == AS_USUAL
-    program = read_program(job, limits, says.reading if as_planned else reading)
+    program = read_program(job, limits, says.reading_at(trajectory) if as_planned else reading)
     with ProgressBar(quiet=quiet) as progress:
         allowed, told = tolerance if taken is None else taken, partial(progress, "verify")
         found = judge(read, program, limits, tolerance=allowed, not_limited=unjudged, progress=told)

@@ -13,7 +13,7 @@ from planner.base.units import RAD_PER_DEG
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.machine.kinematics.chain import kinematics_of
 from planner.nc.arcs import IN_PLANE
-from planner.nc.bezier import at, homogeneous
+from planner.nc.bezier import at, homogeneous, lengths
 from planner.nc.faults import Fault
 from planner.nc.offsets import NO_G54
 from planner.nc.program import Program
@@ -24,6 +24,7 @@ TIP_PLACES = 9  # of a block of the tool's tip at which the joints are looked at
 NO_OFFSETS = ("klipper", "marlin", "reprapfirmware")  # controls whose programs are in machine coordinates
 _COMMENT = re.compile(rb"\(.*?\)|;.*")
 _SETS = re.compile(rb"G0*(?:10|52)(?!\d)", re.IGNORECASE)  # offsets: their words are no places of the motion
+ALL = slice(None)
 ROUNDING = 1e-6  # of coordinates [mm, deg]: no axis is beyond its travel by less
 
 
@@ -65,6 +66,25 @@ def spokes(program: Program) -> tuple[FloatArray, FloatArray]:
     k, axes = program.arc_block, plane_axes(program)
     centre = program.arc_center[np.arange(len(k)), axes]
     return starts(program)[k, axes] - centre, program.end[k, axes] - centre
+
+
+def rise(program: Program) -> FloatArray:
+    """(K,) how far each arc goes along its axis [mm]."""
+    k, n = program.arc_block, program.arc_normal
+    return program.end[k, n] - starts(program)[k, n]
+
+
+def block_lengths(program: Program, axes: slice = ALL) -> FloatArray:
+    """(B,) path length of every block along some axes [mm]; an arc whose radii differ counts with their mean."""
+    length = np.linalg.norm((program.end - starts(program))[:, axes], axis=1)
+    from_start, from_end = spokes(program)
+    radius = (np.hypot(*from_start) + np.hypot(*from_end)) / 2.0
+    length[program.arc_block] = np.hypot(radius * program.arc_sweep, rise(program))
+    splines = program.splines
+    if len(splines):
+        length[np.unique(splines.block)] = 0.0
+        np.add.at(length, splines.block, lengths(homogeneous(splines.points[..., axes], splines.weights)))
+    return length
 
 
 def plane_axes(program: Program) -> Array:

@@ -15,8 +15,18 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.machine import Machine
-from planner.nc.bezier import at, homogeneous, lengths
-from planner.nc.extents import block_boxes, plane_axes, spokes, starts, travel_faults, work_box
+from planner.nc.bezier import at, homogeneous
+from planner.nc.capped import capped
+from planner.nc.extents import (
+    block_boxes,
+    block_lengths,
+    plane_axes,
+    rise,
+    spokes,
+    starts,
+    travel_faults,
+    work_box,
+)
 from planner.nc.faults import Fault
 from planner.nc.program import FEED_MOVES, MOVES, EventTable, Expansion, Kind, Program, ToolPoint, plain
 from planner.nc.reader import interpret, load, source_name
@@ -88,6 +98,7 @@ def inspect_program(
     read, is empty or is not a text."""
     data = load(path)
     program, faults = interpret(data, machine, reading, source=source_name(path))
+    program = program if len(faults) else capped(program, reading.caps, data)
     beyond, notes = travel_faults(program, machine, data)
     if not reading.ignore_travel:
         faults = [*faults, *beyond]
@@ -98,7 +109,7 @@ def inspect_program(
 def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ()) -> ProgramInfo:
     """The figures of a program that has been read."""
     start, (low, high) = starts(program), block_boxes(program)
-    length = _lengths(program, start)
+    length = block_lengths(program)
     is_feed = np.isin(program.kind, FEED_MOVES)
     feed = program.feed[is_feed]
     kinds = [kind for kind in Kind if kind != Kind.SPLINE or len(program.splines)]
@@ -109,7 +120,7 @@ def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ())
         lines=lines,
         blocks={kind.name.lower(): int((program.kind == kind).sum()) for kind in kinds},
         full_circles=int((np.abs(program.arc_sweep) >= 2 * np.pi - 1e-9).sum()),
-        helices=int((np.abs(_rise(program, start)) > _NOWHERE).sum()),
+        helices=int((np.abs(rise(program)) > _NOWHERE).sum()),
         events=_count_events(program),
         extent_min=np.vstack([program.start, low]).min(axis=0),
         extent_max=np.vstack([program.start, high]).max(axis=0),
@@ -129,24 +140,6 @@ def describe(program: Program, *, lines: int, unsupported: Sequence[Fault] = ())
     )
 
 
-def _rise(program: Program, start: FloatArray) -> FloatArray:
-    k, n = program.arc_block, program.arc_normal
-    return program.end[k, n] - start[k, n]
-
-
-def _lengths(program: Program, start: FloatArray) -> FloatArray:
-    """(B,) path length of every block [mm]; an arc whose radii differ counts with their mean."""
-    length = np.linalg.norm(program.end - start, axis=1)
-    from_start, from_end = spokes(program)
-    radius = (np.hypot(*from_start) + np.hypot(*from_end)) / 2.0
-    length[program.arc_block] = np.hypot(radius * program.arc_sweep, _rise(program, start))
-    splines = program.splines
-    if len(splines):
-        length[np.unique(splines.block)] = 0.0
-        np.add.at(length, splines.block, lengths(homogeneous(splines.points, splines.weights)))
-    return length
-
-
 def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: Array) -> dict[float, int]:
     with np.errstate(invalid="ignore", divide="ignore"):
         leaving = (program.end - start) / length[:, None]
@@ -156,7 +149,7 @@ def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: A
         size = np.maximum(length[k], _NOWHERE)
         tangent[k, axes[0]] = -spoke[1] * program.arc_sweep / size
         tangent[k, axes[1]] = spoke[0] * program.arc_sweep / size
-        tangent[k, n] = _rise(program, start) / size
+        tangent[k, n] = rise(program) / size
     _set_spline_tangents(program, leaving, arriving)
     parts = (length > _NOWHERE) | ~np.isin(program.kind, MOVES)  # what joins or separates
     leaving, arriving, is_feed = leaving[parts], arriving[parts], is_feed[parts]

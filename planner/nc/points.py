@@ -89,6 +89,12 @@ def own_text(program: Program) -> bytes | None:
     return None if program.text is None or are_points(program.text) else program.text
 
 
+def in_inches(program: Program, text: bytes) -> bool:
+    """Whether the first G20 or G21 of a program that was read from that text is G20."""
+    found = None if program.pen else UNIT_WORD.search(text)
+    return found is not None and found[1] == b"20"
+
+
 def read_points(data: bytes, source: str) -> Program:
     """The program of a file of points. Raises InputError for anything else."""
     try:

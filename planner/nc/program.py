@@ -205,6 +205,7 @@ class Program:
     limits       : that the program sets and that hold throughout, where they are lower than the machine's
     reading      : the settings it was read with
     tool_point   : of a program of the tool's tip; None where x, y and z are those of the joints
+    uncapped     : (B,) `feed` without the feed caps of `reading`, (0,) without such caps (nc/capped.py)
     pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
     text         : what it was read from; None for points and curves of Python
     """
@@ -238,6 +239,7 @@ class Program:
     limits: tuple[SetLimit, ...] = ()
     reading: Reading = AS_USUAL
     tool_point: ToolPoint | None = None
+    uncapped: FloatArray = field(default_factory=_nothing)
     pen: bool = False
     text: bytes | None = None
 
@@ -261,6 +263,7 @@ class Program:
             raise ValueError(f"Program.splines: {self.splines.points.shape[2]} axes, expected {axes}")
         freeze(self, "frame", np.int32, (blocks if self.frames else 0,))
         freeze(self, "extruded", np.float64, (blocks if len(self.extruded) else 0,))
+        freeze(self, "uncapped", np.float64, (blocks if len(self.uncapped) else 0,), finite=False)
         if self.notes[: len(self.assumptions)] != self.assumptions:
             raise ValueError("Program.notes: the assumptions come first")
         if not (self.feed > 0).all():

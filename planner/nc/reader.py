@@ -14,6 +14,7 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.files import STDIN, require_ending, standard_input
 from planner.machine import Machine, load_machine
+from planner.nc.capped import capped
 from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
 from planner.nc.integers import integers_of
@@ -89,7 +90,7 @@ def parse_program(
     """Read an NC program given as text; like `read_program`."""
     program, faults = interpret(text, machine, reading, source=source)
     require_none(faults, source)
-    return program
+    return capped(program, reading.caps, text.encode() if isinstance(text, str) else text)
 
 
 def interpret(

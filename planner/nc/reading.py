@@ -11,9 +11,11 @@ from __future__ import annotations
 import dataclasses
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from planner.base.errors import InputError
+from planner.nc.feed_caps import FeedCaps, read_feed_caps
 from planner.nc.settings import may_be_ignored
 
 AUTO, ABSOLUTE, INCREMENTAL = "auto", "absolute", "incremental"
@@ -28,6 +30,7 @@ DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS, *_ALIASES)
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
 _OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?|[A-Z]*_\w+")
 _LINES = re.compile(r"(\d+)(?:-(\d+))?")
+_WRITTEN: dict[type, type] = {tuple: list, FeedCaps: str}  # settings in JSON
 _SAY = (
     "write G and M codes, rotary or second axes (A B C U V W), commands of the control ($X, PRINT_START) or lines "
     "(12-20), such as M428,G187,A,12-20"
@@ -52,6 +55,7 @@ class Reading:
                    holds
     block_delete : leave out the lines that start with "/"
     ignore_travel : plan what the travel of the machine's axes does not reach
+    feed_caps    : file of feeds that hold where they are below F, or what was read from one
     """
 
     strict: bool = False
@@ -61,15 +65,23 @@ class Reading:
     dialect: str = AUTO
     block_delete: bool = True
     ignore_travel: bool = False
+    feed_caps: FeedCaps | str | Path | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dialect", _ALIASES.get(self.dialect, self.dialect))
+        if isinstance(self.feed_caps, str | Path):
+            object.__setattr__(self, "feed_caps", read_feed_caps(self.feed_caps))
         for name, allowed in (("arc_centres", ARC_CENTRES), ("extruder", EXTRUDERS), ("dialect", DIALECTS)):
             if getattr(self, name) not in allowed:
                 raise InputError(f"{name} = {getattr(self, name)!r}; allowed are {', '.join(allowed)}")
         if isinstance(self.ignore, str):
             raise InputError(f"ignore = {self.ignore!r} is one text; give a tuple, such as ('M428', 'A')")
         object.__setattr__(self, "ignore", tuple(dict.fromkeys(map(_normal, self.ignore))))
+
+    @property
+    def caps(self) -> FeedCaps | None:
+        """The feed caps, read."""
+        return self.feed_caps if isinstance(self.feed_caps, FeedCaps) else None
 
     @property
     def lines(self) -> list[tuple[int, int]]:
@@ -89,9 +101,9 @@ class Reading:
         return b"\n".join(rows) if rows else data
 
     def changed(self) -> dict[str, Any]:
-        """The settings that are not the usual ones, ready for JSON; `Reading.saved` reads them."""
+        """The settings that are not the usual ones, ready for JSON; `Reading.saved` reads them, all but feed caps."""
         return {
-            field.name: list(value) if isinstance(value := getattr(self, field.name), tuple) else value
+            field.name: _WRITTEN.get(type(value := getattr(self, field.name)), type(value))(value)
             for field in dataclasses.fields(self)
             if getattr(self, field.name) != field.default
         }

@@ -37,8 +37,8 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     `source`, or a feed is negative.
 
     program : what the reader made of `source`, with the settings that it was read with
-    feeds   : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The programmed feed
-              is never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
+    feeds   : (B,) feed of each block [mm/s]; NaN or inf where the programmed one stays. The program's feed
+              and its caps are never exceeded, and below `FEED_MIN` none is written. Ignored where nothing moves at a feed.
     inverse : (B,) how often a block could be run in a minute, to be written under G93; NaN for blocks with a
               feed
     """
@@ -62,17 +62,20 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     often[~per_minute | (in_source.mode_word[row] >= 0)] = np.nan
     # [mm per minute]; not that of a move under G93 and G95, and in a thread
     f_word_feed = programmed * in_source.unit[row]
-    off = np.abs(program.feed[moving] * SECONDS_PER_MINUTE - f_word_feed)
+    asked = program.uncapped if len(program.uncapped) else program.feed
+    off = np.abs(asked[moving] * SECONDS_PER_MINUTE - f_word_feed)
     changeable = (per_minute & (off <= SAME_FEED * f_word_feed)) | ~np.isnan(often)
     moving, row, programmed, often = (column[changeable] for column in (moving, row, programmed, often))
     wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / in_source.unit[row]
 
     slower = wanted < programmed * (1.0 - SAME_FEED)  # False for NaN and inf
     # the blocks of a row (a cycle, corners of a compensated path) share its F word: the fastest of them
-    # decides
+    # decides, but for the lowest cap on them
     rows, first, place = np.unique(row, return_index=True, return_inverse=True)
     fastest = np.zeros(len(rows))
     np.maximum.at(fastest, place, np.where(slower, wanted, np.inf))
+    cap = program.feed[moving] * SECONDS_PER_MINUTE / in_source.unit[row]
+    np.minimum.at(fastest, place, np.where(cap < programmed * (1.0 - SAME_FEED), cap, np.inf))
     fastest[np.isinf(fastest)] = np.nan
     new = _New(rows, fastest, programmed[first], often[first])
     pieces, done = [], 0

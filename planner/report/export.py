@@ -23,6 +23,7 @@ from planner.planning.job.at_tip import joints_of
 from planner.report.planned import LeftOut, planned_program
 from planner.report.replace import (
     CSV_METADATA,
+    FEED_CAPS,
     OUTPUTS,
     PROGRAM,
     SUMMARY,
@@ -120,6 +121,8 @@ def program_to_keep(plan: Plan) -> dict[str, bytes]:
         with suppress(OSError):
             if (name := Path(called).name) not in (*OUTPUTS, SUMMARY):
                 files.setdefault(name, Path(called).read_bytes())
+    if program.reading.caps is not None:
+        files[FEED_CAPS] = program.reading.caps.text
     return files
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -14,10 +15,12 @@ from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
+from planner.nc.feed_caps import read_feed_caps
 from planner.nc.program import Program
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.set_limits import limited
 from planner.planning.job.at_tip import Judged, judged
+from planner.report.replace import FEED_CAPS
 from planner.report.trajectory_reader import TrajectoryFile
 from planner.verifier import NOT_LIMITED_NAMES, Verdict, fit_axes
 
@@ -75,7 +78,8 @@ class FileSays:
     machine: dict[str, Any] | None  # its machine, as in a machine file, or None
     tolerance: float | None  # the tolerance it was planned with [mm], or None
     not_limited: tuple[str, ...]  # quantities that its plan did not limit
-    reading: Reading = AS_USUAL  # how its program was read
+    reading: Reading = AS_USUAL  # how its program was read, without the feed caps
+    capped: bool = False  # whether there were some
     # the file of its program; "<text>" and the like where it had none; None where the file does not say
     program: str | None = None
     kept: str = ""  # the name of the program beside it
@@ -87,6 +91,7 @@ class FileSays:
         machine, tolerance = metadata.get("machine"), metadata.get("tolerance_mm")
         free, program, kept = metadata.get("not_limited", []), metadata.get("program"), metadata.get("kept")
         known = isinstance(free, list) and all(isinstance(n, str) and n in NOT_LIMITED_NAMES for n in free)
+        read_with = metadata.get("reading")
         number = float(tolerance) if is_number(tolerance) else math.nan  # type: ignore[arg-type]
         positive = 0.0 < number < math.inf
         right = {
@@ -98,7 +103,8 @@ class FileSays:
             machine=machine if isinstance(machine, dict) else None,
             tolerance=number if positive else None,
             not_limited=tuple(n for n in free if isinstance(n, str)) if isinstance(free, list) else (),
-            reading=Reading.saved(metadata.get("reading")),
+            reading=Reading.saved(read_with),
+            capped=isinstance(read_with, dict) and "feed_caps" in read_with,
             program=program if isinstance(program, str) else None,
             kept=Path(kept).name if isinstance(kept, str) else "",
             wrong=tuple(name for name, fits in right.items() if not fits),
@@ -116,9 +122,19 @@ class FileSays:
             raise InputError(f"{where}: planner verify {trajectory} JOB", source=str(trajectory))
         return Path(self.program)
 
+    def reading_at(self, trajectory: Path) -> Reading:
+        """How the program was read, with the feed caps beside the file. Raises InputError without them."""
+        if not self.capped:
+            return self.reading
+        caps = dataclasses.replace(
+            read_feed_caps(trajectory.parent / FEED_CAPS), main=Path(self.program or "").name
+        )
+        return dataclasses.replace(self.reading, feed_caps=caps)
+
     def sentences(self, machine_taken: bool, tolerance_taken: bool, reading_taken: bool) -> list[str]:
         """The metadata in words, and whether they were used."""
-        settings = ", ".join(f"{name} {value}" for name, value in self.reading.changed().items())
+        changed = self.reading.changed() | ({"feed_caps": FEED_CAPS} if self.capped else {})
+        settings = ", ".join(f"{name} {value}" for name, value in changed.items())
         said = []
         tolerance = self.tolerance and f"tolerance {self.tolerance:g} mm"
         for what, taken, instead in (

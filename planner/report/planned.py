@@ -18,13 +18,14 @@ from planner.base.units import SECONDS_PER_MINUTE
 from planner.geometry.build import path_per_length
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES
+from planner.nc.feed_caps import FeedCaps
 from planner.nc.language.detect import is_plotter_file
 from planner.nc.points import own_text
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import AUTO
 from planner.nc.text import program_text
-from planner.nc.writer import retimed
+from planner.nc.writer import SAME_FEED, retimed
 from planner.report.word_feed import ABOVE, PlannedBlocks, feeds_of, planned_blocks
 
 if TYPE_CHECKING:
@@ -62,18 +63,22 @@ def planned_program(plan: Plan, planned: PlannedBlocks | None = None) -> tuple[b
         raise LeftOut("the program is points, which have no F words")
     if any(event.text == "M220" for event in plan.program.events if event.text[0] == "M"):
         raise LeftOut("its F words count by a factor that the program sets (M220)")
-    if not _reads_as(data, plan, feeds=True):
+    if not _reads_as(data, plan):
         raise LeftOut(f"{source} does not read as the program that was planned; has what it calls changed?")
     planned = planned or planned_blocks(plan.trajectory, plan.toolpath)
     feeds = _as_programmed(feeds_of(planned, plan.toolpath, plan.machine, len(plan.program)), plan.toolpath)
     if is_plotter_file(data, plan.program.source):
         text = _written_anew(plan, feeds)
-    elif plan.program.expansion is not None:
-        text = _expanded(data, plan, feeds, _per_minute(plan, planned))
     else:
-        text = retimed(data, plan.program, feeds, _per_minute(plan, planned))
-        if not _reads_as(text, plan, feeds=False):
-            raise LeftOut(f"{source} with F words does not read back as the same motion")
+        whole = plan.program if plan.program.reading.caps is None else _read(data, plan, own=True)
+        if plan.program.expansion is not None:
+            text = _expanded(data, plan, whole, feeds, _per_minute(plan, planned))
+        else:
+            text = retimed(data, plan.program, feeds, _per_minute(plan, planned))
+            if not _reads_as(text, plan, whole):
+                raise LeftOut(f"{source} with F words does not read back as the same motion")
+        if not _keeps_caps(text, plan):
+            raise LeftOut("feed caps hold on moves whose F words stay as they are (G93, G95)")
     notes = _notes(plan, planned, text)
     if plan.program.expansion is not None:
         notes.insert(0, "planned.ngc is the expanded program: parameters, loops and calls are written out")
@@ -127,11 +132,11 @@ def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:
     text = readable(
         program_text(planned, np.minimum(_finite(feeds), planned.feed), float(plan.toolpath.tolerance.min()))
     ).encode()
-    _read_back(text, plan, "as an NC program")
+    _read_back(text, plan, planned, "as an NC program")
     return text
 
 
-def _expanded(data: bytes, plan: Plan, feeds: FloatArray, often: FloatArray | None) -> bytes:
+def _expanded(data: bytes, plan: Plan, whole: Program, feeds: FloatArray, often: FloatArray | None) -> bytes:
     """The expanded program with its feeds, which reads back as the same path. Raises LeftOut if it does
     not."""
     from planner.nc.language.flat import flat_program  # 10 ms, for programs that compute
@@ -140,16 +145,40 @@ def _expanded(data: bytes, plan: Plan, feeds: FloatArray, often: FloatArray | No
     found = flat_program(data, plan.machine, plan.program.reading, source=source)
     assert found is not None
     flat = readable(found[0]).encode()
-    text = retimed(flat, _read_back(flat, plan, "expanded"), feeds, often)
-    _read_back(text, plan, "expanded and with F words")
+    caps = plan.program.reading.caps
+    read = _read_back(flat, plan, plan.program, "expanded", caps and caps.by_length)
+    text = retimed(flat, read, feeds, often)
+    _read_back(text, plan, whole, "expanded and with F words")
     return text
 
 
-def _read_back(text: bytes, plan: Plan, how: str) -> Program:
-    """The program that a text reads as. Raises LeftOut if its path is not the one of the plan's program."""
-    planned = plan.program
+def _read(text: bytes, plan: Plan, caps: FeedCaps | None = None, *, own: bool = False) -> Program:
+    """The program that a text of the plan reads as, under other feed caps. Raises InputError.
+
+    own : the text is in the program's own language, and not in that of what is written here
+    """
+    usual = plan.program.reading
+    reading = dataclasses.replace(usual, dialect=usual.dialect if own else AUTO, feed_caps=caps)
+    return parse_program(text, plan.machine, reading, source=plan.program.source)
+
+
+def _keeps_caps(text: bytes, plan: Plan) -> bool:
+    """Whether the F words of a text of the plan are nowhere above its feed caps."""
+    caps = plan.program.reading.caps
+    if caps is None:
+        return True
+    read = _read(text, plan, caps.by_length, own=plan.program.expansion is None)
+    most = plan.program.feed
+    feed = read.feed
+    if caps.by_length is not None:
+        feed, most = read.uncapped, read.feed
+    return bool((feed <= most * (1.0 + SAME_FEED)).all())
+
+
+def _read_back(text: bytes, plan: Plan, planned: Program, how: str, caps: FeedCaps | None = None) -> Program:
+    """The program that a text reads as. Raises LeftOut if its path is not the one of the planned program."""
     try:
-        read = parse_program(text, plan.machine, dataclasses.replace(planned.reading, dialect=AUTO))
+        read = _read(text, plan, caps)
     except InputError as fault:
         raise LeftOut(f"{planned.source} {how} does not read back: {fault.message}") from None
     same = _same(read, planned, ("kind", "path_control", "arc_block", "arc_normal"), within=SAME_PATH)
@@ -170,13 +199,16 @@ def _finite(feeds: FloatArray) -> FloatArray:
     return feeds[known[np.searchsorted(known, np.arange(len(feeds)), side="right").clip(1) - 1]]
 
 
-def _reads_as(text: bytes, plan: Plan, *, feeds: bool) -> bool:
-    """Whether a program's motion is the one of the plan's program, with or without its feeds."""
+def _reads_as(text: bytes, plan: Plan, whole: Program | None = None) -> bool:
+    """Whether a program's motion is the one of the plan's program with its feeds, or that of `whole` without."""
+    program = plan.program
     try:
-        program = parse_program(text, plan.machine, plan.program.reading, source=plan.program.source)
+        if whole is not None:
+            return _same(_read(text, plan, own=True), whole, _MOTION)
+        read = parse_program(text, plan.machine, program.reading, source=program.source)
     except InputError:
         return False
-    return _same(program, plan.program, (*_MOTION, "feed") if feeds else _MOTION)
+    return _same(read, program, (*_MOTION, "feed"))
 
 
 def _same(one: Program, other: Program, names: tuple[str, ...], within: float = 0.0) -> bool:

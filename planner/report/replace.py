@@ -31,9 +31,10 @@ if sys.platform != "win32":
 
 SUMMARY = "summary.json"
 CSV_METADATA = "trajectory.meta.json"
+FEED_CAPS = "feed-caps.csv"
 # Names that a run may write beside those of the program, in the order in which they take their places.
 OUTPUTS = (
-    *(CSV_METADATA, "trajectory.parquet", "trajectory.csv", "trajectory.npz"),
+    *(CSV_METADATA, FEED_CAPS, "trajectory.parquet", "trajectory.csv", "trajectory.npz"),
     *("planned.ngc", "toolpath.png", "profiles.png", "report.html"),
 )
 # The program among the files of a run. Those that it calls have any names: they are replaced, and never removed.

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.nc.language.detect import LATHE_NOTE
-from planner.nc.points import UNIT_WORD, own_text
+from planner.nc.points import in_inches, own_text
 from planner.nc.program import Program
 
-INCH = b"20"
 DIAMETERS = re.compile(rb"^[^(;\n]*?[Gg]0?7(?![\d.])", re.MULTILINE)  # LinuxCNC's word for them
 
 
@@ -41,8 +40,7 @@ def units_of(program: Program, asked: str | None = None) -> Units:
     without one."""
     if asked is not None:
         return UNITS[asked]
-    found = None if program.pen else UNIT_WORD.search(own_text(program) or b"")
-    return UNITS["inch" if found is not None and found[1] == INCH else "mm"]
+    return UNITS["inch" if in_inches(program, own_text(program) or b"") else "mm"]
 
 
 def axis_titles(program: Program, units: Units) -> dict[str, str]:

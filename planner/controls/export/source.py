@@ -37,6 +37,12 @@ def source_of(plan: Plan) -> Source:
     Raises InputError if the text has changed since it was planned, or cannot be written out.
     """
     program, text = plan.program, text_of(plan.program)
+    if program.reading.caps is not None:
+        raise InputError(
+            "a program under feed caps is not exported: its F words are not those of the plan; plan planned.ngc, "
+            "which has the caps as F words, and export that",
+            source=program.source,
+        )
     if text is None and not program.pen:
         return rows_of(*_of_points(program), plan.machine)
     if text is None:

@@ -43,7 +43,7 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         wrong = ", ".join(f"{name} is {str(read.metadata.get(name))[:40]}" for name in says.wrong[:1])
         raise InputError(f"its metadata are not those of a plan: {wrong}; plan again", source=str(file))
     machine = machine_from_dict(says.machine, source=f"{file} (its own machine)")
-    program = read_program(says.program_at(file), machine, says.reading)
+    program = read_program(says.program_at(file), machine, says.reading_at(file))
     if len(program) != summary["blocks"]:
         raise InputError(
             f"the program has {len(program):,} blocks now, and had {summary['blocks']:,} when it was planned; plan again",

@@ -42,12 +42,17 @@ def time_command(
 ) -> None:
     """Predict how long a control takes for a program as it is: per tool, operation and layer."""
     from planner.controls.timing.times import TIMED, control_named, control_times
+    from planner.nc.extents import travel_faults
+    from planner.nc.faults import require_none
     from planner.nc.reader import read_program
     from planner.planning.job.beside import beside_motion
 
     limits = machine_named(machine)
     name = control_named(known_name("control", control, TIMED) if control else None, limits)
     program = read_program(job, limits, reading)
+    faults, notes = travel_faults(program, limits, program.text or b"")
+    if not reading.ignore_travel:
+        require_none(faults, program.source)
     found = control_times(program, limits, name, tolerance)
     beside = beside_motion(program, limits)
     said: dict[str, Any] = {"program": str(job), "machine": limits.name} | asdict(found)
@@ -57,6 +62,8 @@ def time_command(
     if as_json:
         say_json(said | {"assumptions": list(program.assumptions)})
         return
+    for text in notes:
+        say(f"note: {text}", err=True)
     for text in (*program.assumptions, *found.assumed):
         say(f"assumed: {text}", err=True)
     _show(found, said)

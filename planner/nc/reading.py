@@ -84,6 +84,11 @@ class Reading:
         return self.feed_caps if isinstance(self.feed_caps, FeedCaps) else None
 
     @property
+    def unjudged(self) -> tuple[str, ...]:
+        """What the verdict leaves out: the travel, where it is to be ignored."""
+        return ("travel",) if self.ignore_travel else ()
+
+    @property
     def lines(self) -> list[tuple[int, int]]:
         """The first and last of the lines that are left out, 1-based."""
         found = filter(None, map(_LINES.fullmatch, self.ignore))

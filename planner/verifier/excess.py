@@ -24,6 +24,7 @@ class Kind(StrEnum):
     EXACT = "exact path"
     THREAD = "thread"
     EXTRUDER = "extruder"
+    TRAVEL = "travel"  # of an axis
     FILTERS = "after the filters"
     CORNER_SPEED = "eq. 19"
     CORNER_BUDGET = "eq. 18"

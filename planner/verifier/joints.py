@@ -32,6 +32,7 @@ from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Axis, KinematicsData, Machine
 from planner.motion.trajectory import Trajectory
+from planner.verifier import travel
 from planner.verifier.excess import Fault, Kind
 from planner.verifier.findings import check_of
 from planner.verifier.given import DERIVATIVES, Given
@@ -78,13 +79,15 @@ def verify_joints(
         toolpath,
         _of_tip(machine),
         given=dataclasses.replace(given, columns=()),
-        not_limited=(*not_limited, NORMAL_NAME),
+        not_limited=(*not_limited, NORMAL_NAME, travel.NAME),
         progress=progress,
     )
     gap = max((carried.gap(part) for part in overlapping(setpoints, 1)), default=0.0)
     limits = _joint_checks(setpoints, toolpath, machine, given, not_limited)
     broken = [check.fault(Kind.LIMIT, setpoints.axes) for check in limits.values() if check.broken]
     faults = [dataclasses.replace(fault, name=f"joint {fault.name}") for fault in broken]
+    if travel.NAME not in not_limited:
+        faults += travel.travel_faults(setpoints, toolpath, machine)
     error = None if tip.contour_error_mm is None else tip.contour_error_mm + gap
     tolerance = tip.contour.limit
     beyond = error is None or error > tolerance * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING

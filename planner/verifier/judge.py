@@ -8,7 +8,7 @@ from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
-from planner.verifier import contour, error_allocation, findings, samples
+from planner.verifier import contour, error_allocation, findings, samples, travel
 from planner.verifier.claims import claims_of
 from planner.verifier.exact import exact_faults
 from planner.verifier.excess import Kind
@@ -22,7 +22,7 @@ from planner.verifier.ringing import ringing_of
 from planner.verifier.spindle_sync import thread_checks, thread_faults
 from planner.verifier.verdict import Verdict
 
-NOT_LIMITED_NAMES = (*DERIVATIVES, "feed", NORMAL_NAME)
+NOT_LIMITED_NAMES = (*DERIVATIVES, "feed", NORMAL_NAME, travel.NAME)
 READING = 0.9  # share of a verdict's time that the first reading takes, about [-]
 
 
@@ -88,6 +88,10 @@ def verify(
     checks |= extruder.checks
     notes += extruder.notes
     after = after_filters(trajectory, toolpath, machine, pieces)
+    passed = findings.joint_times(readings[0], pieces)
+    of_travel = (
+        [] if travel.NAME in not_limited else travel.travel_faults(trajectory, toolpath, machine, passed)
+    )
     linear_error, angle_error = _both_errors(apart, toolpath)
     corners = error_allocation.check_corners(
         trajectory,
@@ -106,6 +110,7 @@ def verify(
         *([contour_check.fault(Kind.CONTOUR, toolpath.axes)] if contour_check.broken else []),
         *vertex_faults,
         *order_faults,
+        *of_travel,
         *findings.stop_faults(readings, toolpath, pieces, limits),
         *exact_faults(trajectory, readings, toolpath, limits),
         *thread_faults(threads),

@@ -58,7 +58,9 @@ def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: floa
         machine.limits("velocity", (letter,))
     radius = machine.radius
     linear = [machine.axes[letter] for letter in LINEAR]
-    axes = machine.axes
+    # travel is that of the joints
+    own = {"travel_min": None, "travel_max": None}
+    axes = {a: axis.model_copy(update=own) if a in LINEAR else axis for a, axis in machine.axes.items()}
     if wide is not None:
         free = Axis(
             velocity=wide * max(axis.velocity for axis in linear),

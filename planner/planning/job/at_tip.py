@@ -70,7 +70,8 @@ def judged(setpoints: Trajectory, job: Judged) -> Verdict:
     Raises InputError as `verify` does.
     """
     chain = chain_of(job.program, job.machine)
-    how = {"given": job.given, "not_limited": job.not_limited, "progress": job.progress}
+    free = (*job.not_limited, *job.program.reading.unjudged)
+    how = {"given": job.given, "not_limited": free, "progress": job.progress}
     if chain is None:
         return verify(setpoints, job.toolpath, job.machine, **how)  # type: ignore[arg-type]
     return verify_joints(setpoints, job.toolpath, job.machine, tool_length=chain.length, **how)  # type: ignore[arg-type]
@@ -82,9 +83,8 @@ def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:
         return dataclasses.replace(plan, machine=machine)
     began = time.perf_counter()
     joints = joint_setpoints(plan.trajectory, chain)
-    found = verify_joints(
-        joints, plan.toolpath, machine, tool_length=chain.length, not_limited=plan.verdict.not_limited
-    )
+    free = (*plan.verdict.not_limited, *plan.program.reading.unjudged)
+    found = verify_joints(joints, plan.toolpath, machine, tool_length=chain.length, not_limited=free)
     spent = plan.timings.get("verify", 0.0) + time.perf_counter() - began
     return dataclasses.replace(
         plan,

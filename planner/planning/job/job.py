@@ -190,9 +190,10 @@ class Job:
             else:
                 take(trajectory)
                 judged = trajectory
+        free = (*not_limited, *self.program.reading.unjudged)
         with self.stage("verify") as progress:
             verdict = verify(
-                judged, toolpath, machine, motion=whole, seed=seed, not_limited=not_limited, progress=progress
+                judged, toolpath, machine, motion=whole, seed=seed, not_limited=free, progress=progress
             )
         runs = places.runs()
         if runs is None:

@@ -30,7 +30,7 @@ ROWS = 20  # of a table at most, the longest ones; --json has all
 def time_command(
     job: options.Job,
     machine: options.MachineOption = None,
-    control: Annotated[str | None, options.control_option(" (default: that of the machine)")] = None,
+    control: options.ControlOption = None,
     tolerance: options.ToleranceOption = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="plan the motion too, and predict what export would bring")

@@ -146,6 +146,7 @@ UnitsOption = Annotated[
         "mm or inch, for what is shown (default: as in the program); feeds are per minute",
     ),
 ]
+ControlOption = Annotated[str | None, control_option(" (default: that of the machine)")]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON instead of a table")]
 ThreadsOption = Annotated[
     int | None,

@@ -106,8 +106,10 @@ def plan_command(
         return
     (job,) = jobs
     from planner import plan
+    from planner.nc.reader import read_program
+    from planner.planning.job.stages import Stages
     from planner.planning.job.trace import Trace
-    from planner.report.export import SUMMARY, check_places, write_plan
+    from planner.report.export import SUMMARY, check_places, files_to_keep, write_plan
     from planner.report.replace import check_file, write_whole
     from planner.report.summary import summary
     from planner.report.tables import assumed_lines, brief_table, corners_table, plan_table
@@ -121,8 +123,20 @@ def plan_command(
         check_file(trace, [job, Path(machine or options.DEFAULT_MACHINE)], force=force)
     steps = Trace(line=partial(say, err=True) if verbose else None)
     with ProgressBar(quiet=quiet or verbose) as progress:
-        how |= {"tolerance": tolerance, "reading": reading, "progress": progress}
-        result = plan(job, machine_named(machine), log=steps if verbose or trace is not None else None, **how)
+        stages, limits = Stages(progress), machine_named(machine)
+        with stages.stage("read"):
+            program = read_program(job, limits, reading)
+        if output is not None:
+            files_to_keep(program)  # what has no place there is refused before any work
+        result = plan(
+            program,
+            limits,
+            tolerance=tolerance,
+            progress=progress,
+            log=steps if verbose or trace is not None else None,
+            **how,
+        )
+        result.timings.update(stages.timings)
         written: list[str] = []
         if output is not None and result.trajectory is not None:
             progress("write", 0.0)

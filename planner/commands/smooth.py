@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from planner.base.errors import InputError
+from planner.base.names import known_name
 from planner.base.units import MICROMETRE
 from planner.commands import options
 from planner.commands.machine import machine_named
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from planner.nc.program import Program
     from planner.verifier import SamePath
 
+SAME_TIME = 0.001  # predictions this near are the same [-]
 SHARE = 0.5  # of the tolerance that the new path may take
 ROOM = 0.98  # of what is allowed that is made use of: the comparison needs some for the chords of its arcs
 _COMMENT = re.compile(rb"\([^)\n]*\)?|;[^\n]*")
@@ -38,6 +40,7 @@ def smooth_command(
         float,
         typer.Option("--share", metavar="S", help="of the tolerance that the new path may take, 0 to 1"),
     ] = SHARE,
+    control: options.ControlOption = None,
     lines: Annotated[bool, typer.Option("--lines", help="straight moves alone, no arcs")] = False,
     force: options.ForceOption = False,
     as_json: options.JsonOption = False,
@@ -47,6 +50,7 @@ def smooth_command(
     """Write a program with fewer lines: short straight moves become longer ones and arcs, within a share of the
     tolerance; all other lines stay. What was written is read back and compared with the program."""
     from planner.controls.export.fewer import fewer_lines
+    from planner.controls.timing.times import TIMED, control_times
     from planner.geometry.build import toolpath_from_program
     from planner.nc.reader import load, parse_program, source_name
     from planner.report.replace import refuse_inputs, write_new
@@ -67,20 +71,28 @@ def smooth_command(
             source=str(output),
             line=found.line or None,
         )
+    own = limits.control.name if limits.control is not None else None
+    name = known_name("control", control, TIMED) if control else own if own in TIMED else None
+    seconds = [control_times(each, limits, name, tolerance).seconds for each in (program, again) if name]
     write_new(output, made.text, force=force)
     if as_json:
         said = {"lines_before": made.before, "lines_after": made.after, "arcs": made.arcs, "share": share}
+        said |= dict(zip(("seconds_before", "seconds_after"), seconds, strict=False))
         say_json(said | {"allowed_mm": share * whole, "within_mm": found.within, "kept": made.kept})
         return
+    if seconds:
+        longer = seconds[1] / seconds[0] - 1.0
+        verdict = "LONGER" if longer > SAME_TIME else "shorter" if longer < -SAME_TIME else "the same"
+        say(
+            f"{verdict} on {name}: {seconds[1]:.4f} s instead of {seconds[0]:.4f} s ({longer:+.1%}), predicted"
+        )
     say(
         f"{output}: {made.before:,} straight moves become {made.after:,} ({made.after / made.before - 1.0:+.0%}), {made.arcs:,} of "
         f"them arcs; within {found.within / MICROMETRE:.3g} µm of the program both ways and in order, of {share:.0%} of "
         f"{whole / MICROMETRE:.3g} µm"
     )
-    if made.arcs:
-        say(
-            "  a control may run short arcs slower than lines: planner time tells, of both files; --lines writes none"
-        )
+    if made.arcs and not seconds:
+        say("  a control may run short arcs slower than lines: --control NAME predicts; --lines writes none")
     for why, (count, line) in made.kept.items():
         say(f"  kept as they are: {count:,} line{'s' * (count > 1)}, first line {line}: {why}")
 

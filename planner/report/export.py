@@ -38,6 +38,7 @@ from planner.report.trajectory_file import Format, units, write_trajectory
 from planner.report.word_feed import BlockWatch, PlannedBlocks, WordFeed
 
 if TYPE_CHECKING:
+    from planner.nc.program import Program
     from planner.planning.job.plan import Plan
 
 PLANNED = "planned.ngc"
@@ -72,7 +73,7 @@ def write_plan(
         raise ValueError("write_plan: the plan has no trajectory; see plan.sentence")
     directory = Path(directory)
     run_id = uuid.uuid4().hex
-    beside = program_to_keep(plan)
+    beside = files_to_keep(plan.program)
     kept = {name for name in (PLANNED, *beside) if _is_source(plan, directory / name)}
     for name, text in beside.items():  # the user's own, which no run wrote
         there = directory / name
@@ -109,18 +110,23 @@ def write_plan(
     return names
 
 
-def program_to_keep(plan: Plan) -> dict[str, bytes]:
-    """The program of a plan, and the files that it calls, by their names in the directory of the plan: what
-    reads the plan again needs no others. The program is the first; there is none that Python made of more
-    than points and curves."""
-    program = plan.program
+def files_to_keep(program: Program) -> dict[str, bytes]:
+    """A program, and the files that it calls, by their names in the directory of its plan: what reads the plan
+    again needs no others. The program is the first; there is none that Python made of more than points and
+    curves.
+
+    Raises InputError for a called file whose name is that of another file of the directory.
+    """
     if program.text is None:
         return {f"{KEPT}.json": points_file(program)} if is_points(program) else {}
     files = {kept_name(program.source, program.text): program.text}
     for called in {frame.source for frame in program.frames} - {program.source}:
+        name = Path(called).name
+        if name in (*OUTPUTS, SUMMARY, *files):
+            what = f"the program calls {name}, and a plan's directory has a file of that name of its own; rename it"
+            raise InputError(what, source=called)
         with suppress(OSError):
-            if (name := Path(called).name) not in (*OUTPUTS, SUMMARY):
-                files.setdefault(name, Path(called).read_bytes())
+            files[name] = Path(called).read_bytes()
     if program.reading.caps is not None:
         files[FEED_CAPS] = program.reading.caps.text
     return files
@@ -170,7 +176,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "run_id": run_id,
             "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             "program": plan.program.source,
-            "kept": next(iter(program_to_keep(plan)), None),
+            "kept": next(iter(files_to_keep(plan.program)), None),
             "assumptions": plan.program.assumptions,
             "method": plan.method,
             "geometry": plan.geometry,

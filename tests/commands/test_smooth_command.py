@@ -70,3 +70,36 @@ def test_shares_beyond_the_tolerance_are_refused(tmp_path: Path, share: str) -> 
     job = tmp_path / "job.nc"
     job.write_text(ZIGZAG)
     assert run("smooth", job, "-o", tmp_path / "out.nc", "--share", share).exit_code == 2
+
+
+def test_what_a_control_takes_is_told_before_the_lines(tmp_path: Path) -> None:
+    """By the same predictions as `planner time` makes of both files; without a control nothing is told."""
+    job, out = tmp_path / "job.nc", tmp_path / "out.nc"
+    text = "".join(f"X{0.5 * k:.3f} Y{0.05 * (k % 2):.3f}\n" for k in range(1, 200))
+    job.write_text("G21 G90 G17 G94 G64\nG0 X0 Y0 Z0\nF3000\nG1 X0\n" + text + "M2\n")
+    for control in ("grbl", "linuxcnc"):
+        done = run("smooth", job, "-o", out, "--force", "--tolerance", "0.2", "--control", control)
+        assert done.exit_code == 0
+        told = [
+            json.loads(run("time", file, "--control", control, "--tolerance", "0.2", "--json").stdout)[
+                "seconds"
+            ]
+            for file in (job, out)
+        ]
+        longer = told[1] / told[0] - 1.0
+        word = "LONGER" if longer > 0.001 else "shorter" if longer < -0.001 else "the same"
+        first = done.stdout.splitlines()[0]
+        assert first.startswith(f"{word} on {control}: {told[1]:.4f} s instead of {told[0]:.4f} s")
+    assert "on grbl" not in run("smooth", job, "-o", out, "--force", "--tolerance", "0.2").stdout
+    assert run("smooth", job, "-o", out, "--force", "--control", "mach3").exit_code == 2
+
+
+@pytest.mark.parametrize("line", ["G1 X1 Y1 E{k}", "G5 I1 J1 P-1 Q1 X{k} Y2"])
+def test_lines_with_an_extruder_and_splines_stay_and_are_named(tmp_path: Path, line: str) -> None:
+    job, out = tmp_path / "job.nc", tmp_path / "out.nc"
+    lines = [line.format(k=k) for k in range(1, 4)]
+    job.write_text(ZIGZAG.replace("M2\n", "\n".join([*lines, "M2", ""])))
+    done = run("smooth", job, "-o", out, "--extruder", "ignore")
+    assert done.exit_code == 0
+    assert all(each in out.read_text().splitlines() for each in lines)
+    assert ("E of an extruder" if "E" in line else "arcs and curves") in done.stdout

@@ -16,6 +16,7 @@ from planner.nc.reader import parse_program
 from planner.report.export import check_places, write_plan
 from planner.report.summary import info_summary, summary
 from planner.report.trajectory_file import FORMATS, read_trajectory
+from tests.commands.command_line import run
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
@@ -118,3 +119,18 @@ def test_unwritable_directory(tmp_path: Path) -> None:
 def test_info_is_json() -> None:
     said = info_summary(describe(parse_program(SQUARE), lines=7))
     assert json.loads(json.dumps(said, allow_nan=False))["blocks"]["line"] == 4
+
+
+@pytest.mark.parametrize("name", ["planned.ngc", "summary.json"])
+def test_a_called_file_named_as_one_of_the_directory_is_refused_before_any_work(
+    tmp_path: Path, name: str
+) -> None:
+    word = Path(name).stem
+    (tmp_path / f"{word}.ngc").write_text(f"o<{word}> sub\nG1 X5\no<{word}> endsub\n")
+    (tmp_path / "job.ngc").write_text(f"G21 G90 F100\nG0 X0\no<{word}> call\nM2\n")
+    done = run("plan", tmp_path / "job.ngc", "-o", tmp_path / "out")
+    refused = name == "planned.ngc"  # a subprogram's file ends in .ngc
+    assert done.exit_code == (2 if refused else 0)
+    assert ("rename it" in done.output) == refused
+    assert (tmp_path / "out").exists() != refused
+    assert run("plan", tmp_path / "job.ngc").exit_code == 0

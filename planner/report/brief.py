@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 NOTES, LIMITS, TOOLS, FAULTS = 3, 4, 6, 2  # that are told
 DIGITS = 6  # behind the point of lengths: what is less is rounding
-QUANTITIES = {"velocity": "speed", "acceleration": "acceleration", "jerk": "jerk"}
+QUANTITIES = {"velocity": "speed", "acceleration": "acceleration", "jerk": "jerk", "power": "drive power"}
 NAMES = {
     "linuxcnc": "LinuxCNC",
     "klipper": "Klipper",
@@ -48,7 +48,7 @@ def brief_rows(plan: Plan, units: Units, tolerance: float | None = None) -> Rows
         return [("time", "-"), (VERDICT, f"not solved: {plan.sentence}")]
     rows: Rows = [("time", _time(plan))]
     tools = tool_times(plan)
-    if len(tools) > 1:
+    if tools:
         said = first_of([f"{name or 'before'} {seconds:.4g} s" for name, seconds in tools.items()], TOOLS)
         rows.append(("tools", ", ".join(said)))
     if plan.method != "stop" or plan.machine.control is not None:
@@ -77,9 +77,9 @@ def _first(lines: list[str]) -> list[str]:
 
 
 def tool_times(plan: Plan) -> dict[str, float]:
-    """Seconds of the motion by tool, "T1"; empty where the program names none."""
+    """Seconds of the motion by tool, "T1", and "" before the first; empty where the program has not several."""
     names = tools_of(plan.program)
-    if names is None or plan.trajectory is None:
+    if plan.trajectory is None or len({*(names or ())}) < 2:
         return {}
     lasting = planned_blocks(plan.trajectory, plan.toolpath).duration
     blocks = np.bincount(plan.toolpath.block, lasting, len(plan.program)) + plan.program.dwell
@@ -122,6 +122,8 @@ def _time(plan: Plan) -> str:
 def _saved(plan: Plan, tolerance: float | None) -> str:
     assert plan.trajectory is not None
     time, found = plan.trajectory.cycle_time, control_of(plan, tolerance)
+    if found is None and np.isfinite(plan.machine.powers(plan.toolpath.axes)).any():
+        return "not known: a stop at every block is planned without the limits of drive power"
     if found is None:
         other, takes = "a stop at every block", plan.stop_time
     else:

@@ -37,6 +37,8 @@ def plan_rows(plan: Plan) -> Rows:
         rows.append(("cycle time", f"{time:.4f} s{hours_text(time)}"))
         if plan.method != "stop" and np.isfinite(plan.stop_time):
             times = f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long"
+            free = np.isfinite(plan.machine.powers(plan.toolpath.axes)).any()
+            times += "; without the limits of drive power" if free else ""
             rows.append(("stopping at every block", times))
         if plan.least_time is not None:
             above = 100.0 * (time / plan.least_time - 1.0)

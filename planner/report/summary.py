@@ -14,6 +14,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc.info import PLACES_SHOWN
 from planner.nc.program import ToolPoint
+from planner.report.brief import tool_times
 from planner.report.rows import beside_summary, plan_rows, price_summary
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "sentence": plan.sentence,
             "cycle_time_s": plan.trajectory.cycle_time if plan.trajectory is not None else None,
             "beside_motion": beside_summary(plan),
+            "tools_s": tool_times(plan),
             "stop_time_s": plan.stop_time,
             "least_time_s": plan.least_time,
             "tolerance_mm": uniform(plan.toolpath.tolerance),

@@ -8,7 +8,12 @@ import pytest
 import planner
 from planner.base.errors import InputError
 from planner.machine import Machine
+from planner.nc.points import own_text
 from planner.planning.job.plan import Plan
+from planner.report.brief import brief_rows
+from planner.report.html.page import report_page
+from planner.report.summary import summary
+from planner.report.units import UNITS
 from planner.verifier import Given, verify
 
 TURNS = "G21\nG64 P0.03 F5400\nG1 X14\nG1 X22 Y9\nG2 X30 Y17 I8 J0\nG1 X9 Y26\n"
@@ -69,3 +74,23 @@ def test_methods_that_do_not_keep_it_say_so(method: str) -> None:
         planner.plan(program, machine, method=method)
     with pytest.raises(InputError, match="power of axis x"):
         planner.plan(program, machine, corner="bezier")
+
+
+def test_a_plan_says_where_drive_power_holds_it() -> None:
+    """As a share of the time, against where the columns are at the limit; in words, and on the page."""
+    plan = planned(TURNS, machine_of(0.04))
+    free = planned(TURNS, machine_of(None))
+    motion = plan.trajectory
+    power = np.abs(motion.velocity * motion.acceleration)[:, :2] / (1e6 * 0.04)
+    at_limit = (power > 0.98).any(axis=1).mean()
+    told = dict(plan.grid.ranked())
+    assert at_limit > 0.3
+    assert max(told["power.x"], told["power.y"]) <= at_limit + 0.1
+    assert told["power.x"] + told["power.y"] >= at_limit - 0.1
+    assert not any(name.startswith("power") for name, _ in free.grid.ranked())
+    rows = dict(brief_rows(plan, UNITS["mm"]))
+    assert "drive power of X" in rows["limited by"]
+    assert rows["saved"].startswith("not known"), "no stop at every block keeps the power"
+    assert dict(brief_rows(free, UNITS["mm"]))["saved"][0].isdigit()
+    page = report_page(plan, own_text(plan.program), summary(plan))
+    assert "power.x" in page

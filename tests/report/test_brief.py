@@ -15,6 +15,7 @@ from planner.machine import ControlData, load_machine
 from planner.nc.reader import parse_program
 from planner.planning.job.beside import Beside
 from planner.report.brief import brief_rows, control_of, limit_text, tool_times
+from planner.report.summary import summary
 from planner.report.tables import brief_table
 from planner.report.units import UNITS, units_of
 
@@ -81,6 +82,7 @@ def test_units_are_those_of_the_program(program: str, name: str) -> None:
     [
         ("jerk.x", "jerk of X"),
         ("velocity.a", "speed of A"),
+        ("power.y", "drive power of Y"),
         ("feed", "the programmed feed"),
         ("spindle power", "spindle power"),
     ],
@@ -98,6 +100,11 @@ def test_the_times_of_tools_are_those_of_the_motion() -> None:
     assert sum(found.values()) == pytest.approx(plan.cycle_time, abs=machine.dt)
     assert found["T2"] - found["T1"] == pytest.approx(0.5, abs=machine.dt), "the dwell"
     assert np.isfinite([*found.values()]).all()
+    assert summary(plan)["tools_s"] == pytest.approx(found)
+    one = planner.plan(
+        planner.read_program(text=job.replace("T2 M6", ""), machine=machine), machine, method="stop"
+    )
+    assert summary(one)["tools_s"] == {}
 
 
 @pytest.mark.parametrize(

@@ -147,6 +147,10 @@ def siemens_mark(words: Words, source: str) -> str:
         return "its name"
     if len(codes := words.find("G", *_SIEMENS_CODES)):
         return f"{words.text(codes[0])} in line {words.line[words.row(codes[0])]}"
+    for row in words.rows_with(words.find("G", 4.0)):
+        letters = set(words.of_rows(row)[0].tolist())
+        if ord("F") in letters and not letters & set(b"PXUS"):
+            return f"G4 F in line {words.line[row]}"
     odd = words.rows_with(
         np.flatnonzero((words.letter == FAULT) | np.isin(words.letter, (ord("%"), ord("O"))))
     )

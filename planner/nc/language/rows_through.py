@@ -215,9 +215,9 @@ class RowsThrough(Places):
             axes = sorted({*axes, *IN_PLANE[self.normal]})
         if set(axes) & set(IN_PLANE[self.normal]):
             self._beside = False
-        geometry = {G, *AXES, *CENTRES, RADIUS}
+        geometry = {G, ord("N"), *AXES, *CENTRES, RADIUS}
         geometry |= {TURNS} if arc is not None else set()
-        # all but the motion code, coordinates and centre
+        # all but the number, the motion code, coordinates and centre
         rest = [word for word in row.words if word[0] not in geometry or (word[0] == G and word[1] > 3.0)]
         at = row.words[0][2]
         move = Move(TravelRow(rest, row.line, row.frame), at, self.motion, self._mapped, mapped, axes, arc)

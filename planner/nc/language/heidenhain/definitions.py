@@ -217,7 +217,7 @@ class Definitions(Flow):
         """Cycle 1: its lines give parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
             return [tree.assign(block.place, (text.variable("cycle"), tree.ONE))]
-        column, match = block.column, block.take(r"\s*(?:DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*")
+        column, match = block.column, block.take(r"\s*(?:SET\s?UP|DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*")
         if match is None or not 1 <= part <= len(_OLD_PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
         return [tree.assign(block.place, (text.parameter(_OLD_PECKING[part - 1]), block.value()))]
@@ -298,6 +298,8 @@ class Definitions(Flow):
         own = (*TOOL_POINT_ON, 140)  # with a feed of their own
         feed = given.feed is not None and not any(code in own for code, _ in given.codes)
         if given.axes or given.polar or given.turn or feed or given.side is not None:
+            for code in (code for code, _ in given.codes if code in tables.REFUSED):
+                raise block.fault(f"M{code} is not read: {tables.REFUSED[code]}; {REMEDY}", column)
             raise block.fault("only M codes are read here; write the move and its feed with L", column)
         before, after, _ = self._codes(block, given)
         return before, after

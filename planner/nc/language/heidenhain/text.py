@@ -231,8 +231,8 @@ class Items:
 
 
 def items(block: Block, turning: bool = False) -> Items:
-    """Read what stands behind the function; `turning`: absolute coordinates of A, B and C, too. Raises
-    ProgramFault for what a path function does not take here."""
+    """Read what stands behind the function; `turning`: coordinates of A, B and C, too, as the interpreter knows
+    them. Raises ProgramFault for what a path function does not take here."""
     found, end = Items(), len(block.text.rstrip())
     while block.column < end:
         item = block.take(_ITEM)

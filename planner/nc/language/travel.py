@@ -115,8 +115,8 @@ class Travel(RowsThrough):
         self._coming = CornerMove(kind, size * self.scale(), line, modal)
 
     def depart(self, way: ContourWay, end: FloatArray, *, raised: bool) -> None:
-        """DEP: leave the contour, for LCT to a point (3,), and with `raised` to its height; compensation is off
-        behind it. Raises ValueError."""
+        """DEP: leave the contour, for LCT to its `end` (3,), and where it is `raised` to the height of that;
+        compensation is off behind it. Raises ValueError."""
         self._no_corner()
         if self._offset is None or not self._offset.started:
             raise ValueError("DEP without a contour with radius compensation (RL, RR) before it")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent.parent / "planner"
@@ -11,10 +12,13 @@ ARRAYS = re.compile(r"\b(FloatArray|Array)\b")
 SHAPE = re.compile(
     r"\((?:[\w+\-*. ]+,|\.\.\.,|\*[\w.]+, )[\w+\-*., ]*\)"
 )  # (n,), (N+1, 3, A), (*times.shape, A)
-TREES = {
-    file.relative_to(PACKAGE).as_posix(): ast.parse(file.read_text("utf-8"))
-    for file in sorted(PACKAGE.rglob("*.py"))
-}
+
+
+@cache
+def trees() -> dict[str, ast.Module]:
+    """All modules of the package by name."""
+    files = sorted(PACKAGE.rglob("*.py"))
+    return {file.relative_to(PACKAGE).as_posix(): ast.parse(file.read_text("utf-8")) for file in files}
 
 
 def is_public(name: str) -> bool:
@@ -87,7 +91,7 @@ def array_faults(function: ast.FunctionDef, text: str) -> list[str]:
 
 
 def test_every_public_name_says_what_it_is() -> None:
-    found = faults(TREES)
+    found = faults(trees())
     assert not found, "\n".join(found)
 
 

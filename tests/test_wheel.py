@@ -58,7 +58,9 @@ def test_it_plans_where_nothing_else_is(archives: tuple[Path, Path], tmp_path: P
     pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check", "--quiet"]
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     subprocess.run(
-        [*pip, "install", "--no-deps", "--no-index", str(archives[0])], check=True, env=environment
+        [*pip, "install", "--no-compile", "--no-deps", "--no-index", str(archives[0])],
+        check=True,
+        env=environment,
     )
     (site,) = (venv / "lib").glob("python*/site-packages")
     here = Path(importlib.util.find_spec("numpy").origin).parents[1]  # type: ignore[union-attr,arg-type]

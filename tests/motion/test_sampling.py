@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from whole_plans import smooth_path
@@ -22,6 +24,7 @@ SHARES = np.array([0.1, 0.3, 0.6, 0.9])
 HELIX = "G21 G90 G17 G64 P0.05 F3000\nG1 X10\nG2 X10 Y10 J5 Z1\nG1 X0 Y11\nM2\n"
 
 
+@cache
 def paths() -> dict[str, PathSamples]:
     corners = smooth_path(problems.pentagon(), MACHINE)
     arcs = smooth_path(parse_program(HELIX, MACHINE), MACHINE)
@@ -32,9 +35,6 @@ def paths() -> dict[str, PathSamples]:
     return {**grids, "coarse": sample_path(splines, MACHINE, 1.0)}
 
 
-PATHS = paths()
-
-
 def grid_of(samples: PathSamples) -> Grid:
     columns = (getattr(samples, name) for name in ("piece", "s", "element", "w0", "w1", "segment"))
     return Grid(*columns, samples.path.passed)
@@ -42,7 +42,7 @@ def grid_of(samples: PathSamples) -> Grid:
 
 def nearly_a_cusp() -> tuple[ElementTable, Grid]:
     """One span (w - 1/2)^3 + 0.1 w, on which no polynomial of the arc length is any good."""
-    table = PATHS["corners"].table
+    table = paths()["corners"].table
     spans = np.zeros(1, span_dtype(3))
     spans["coef"][0, :4, 0], spans["width"] = (-0.125, 0.85, -1.5, 1.0), 1.0
     table, element = table._replace(spans=spans), len(table.legs)
@@ -53,16 +53,22 @@ def nearly_a_cusp() -> tuple[ElementTable, Grid]:
     return table, Grid(*map(read_only, columns), np.array([0.0, 1.0]))
 
 
-CASES = {name: (samples.table, grid_of(samples)) for name, samples in PATHS.items()} | {
-    "cusp": nearly_a_cusp()
-}
+NAMES = ("corners", "arcs", "splines", "coarse", "cusp")
 
 
-@pytest.mark.parametrize("name", list(CASES))
+@cache
+def case(name: str) -> tuple[ElementTable, Grid, int]:
+    """The elements, the grid and the number of axes of a path."""
+    if name == "cusp":
+        return *nearly_a_cusp(), 3
+    samples = paths()[name]
+    return samples.table, grid_of(samples), samples.d1.shape[1]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_samples_lie_where_their_arc_length_says(name):
     """At a constant feed of 1 mm/s from each grid point on: four samples in every interval, s known, the position by hand."""
-    table, grid = CASES[name]
-    axes = 3 if name == "cusp" else PATHS[name].d1.shape[1]
+    table, grid, axes = case(name)
     inverse = inverses(table, grid, axes)
     interval = np.setdiff1d(np.arange(len(grid.s)), grid.piece[1:] - 1)
     interval = interval[:: max(1, len(interval) // LOOKED_AT)]
@@ -93,11 +99,10 @@ def even_law(grid: Grid) -> tuple[object, ...]:
     return *columns, float(grid.s[-1]) + 1.0
 
 
-@pytest.mark.parametrize("name", list(CASES))
+@pytest.mark.parametrize("name", NAMES)
 def test_a_sample_does_not_depend_on_the_others_beside_it(name):
     """Each time alone, to the last digit: chunks of any size give the same bytes."""
-    table, grid = CASES[name]
-    axes = 3 if name == "cusp" else PATHS[name].d1.shape[1]
+    table, grid, axes = case(name)
     inverse, law = inverses(table, grid, axes), even_law(grid)
     times = np.linspace(0.0, grid.s[-1], 53)
     together = sample(table, law, grid, inverse, read_only(times), axes)
@@ -110,8 +115,7 @@ def test_a_sample_does_not_depend_on_the_others_beside_it(name):
 
 def test_each_way_of_inverting_is_taken():
     """By the polynomial alone, with a step by the slope, and by the curve."""
-    off = [inverses(*CASES[name], 3 if name == "cusp" else PATHS[name].d1.shape[1])[:, 0] for name in CASES]
-    off = np.concatenate(off)
+    off = np.concatenate([inverses(*case(name))[:, 0] for name in NAMES])
     assert ((off > 0.0) & (off <= LENGTH_ROUNDING)).any()
     assert ((off > LENGTH_ROUNDING) & (off <= ONE_STEP)).any()
     assert (off > ONE_STEP).any()

@@ -1,22 +1,20 @@
 """Thousands of random jobs, planned, judged twice, and held against laws: what goes wrong?
 
-    python -m benchmarks campaign [--count N] [--seed S] [--processes P] [--again SEED ...] [--seconds T] [--limit C] [--anew]
-    python -m benchmarks campaign [--count N] [--seed S] [--processes P] [--again SEED ...] [--seconds T] [--limit C] [--sizes small]
+    python -m benchmarks campaign [--count N] [--seed S] [--processes P | --cluster ADDRESS] [--again SEED ...] [--seconds T]
+                                  [--limit C] [--anew] [--sizes small]
 
-A job follows from its seed (jobs.py): program, machine, tolerance, period, method. Its plan (rows.py) is judged by
-the planner's verifier and by another judge that shares no code with the package (judge.py); every tenth job is planned once
-more, changed by a law (laws.py). Each job has C processor seconds in a child process, which is ended if they do not suffice.
+A job follows from its seed (jobs.py): program, machine, tolerance, period, method; from seed 100,000 on half of the jobs have the
+default method and effort. Its plan (rows.py) is judged by the planner's verifier and by another judge that shares no code with the
+package (judge.py), and its time compared with the proved bound; every tenth job is planned once more, changed by a law (laws.py). Each
+job has C processor seconds in a child process, which is ended if they do not suffice: P of them here, or those of the workers of a
+Dask cluster (cluster.py).
 
 Every job is a row of results/campaign.jsonl at once. At the end the rows are counted in results/campaign.json (tally.py),
 with a summary in campaign.md, and removed. Jobs that are in one of them are not planned again. --again plans jobs once more; what comes
 of that is told beside, and they count as they came out the first time. All jobs of a campaign are planned at one commit of the planner:
 at another one, and after a change of the draws, --anew begins again. What compiling a kernel takes, once on a machine, is not counted:
-a job that was ended in it would leave it to the next one.
-Every job is a row of results/campaign.jsonl at once. At the end the rows are counted in results/campaign.json (tally.py), with
-a summary in campaign.md, and removed. Jobs that are in one of them are not planned again; --again plans what is not as it should be. A
-change of the draws makes other jobs of the seeds: the campaign then begins anew. What compiling a kernel takes, once on a machine, is
-not counted: a job that was ended in it would leave it to the next one. With --sizes jobs go the ways of large ones
-(planner/base/sizes.py), and their rows to a file of their own; `python -m benchmarks.campaign.sizes` compares them.
+a job that was ended in it would leave it to the next one. With --sizes jobs go the ways of large ones (planner/base/sizes.py), and
+their rows to a file of their own; `python -m benchmarks.campaign.sizes` compares them.
 """
 
 from __future__ import annotations
@@ -34,12 +32,14 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.campaign.cluster import rows_on_cluster
 from benchmarks.campaign.jobs import fingerprint, job
 from benchmarks.campaign.rows import Row, about, outcome
 from benchmarks.campaign.table import write_summary
 from benchmarks.campaign.tally import CRASH, TOO_LONG, Tally, wrongs
 from benchmarks.record import RESULTS, planner_state
 from planner.base import kernel_files, sizes
+from planner.base.errors import InputError, NotSolvedError
 from planner.base.threads import use_threads
 
 KEPT, SUMMARY = RESULTS / "campaign.jsonl", RESULTS / "campaign.json"
@@ -173,6 +173,9 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the first job")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument(
+        "--cluster", metavar="ADDRESS", help="of a Dask scheduler whose workers plan the jobs"
+    )
+    parser.add_argument(
         "--again", type=int, nargs="*", help="these jobs, or all that failed, once more; told beside"
     )
     parser.add_argument(
@@ -210,14 +213,21 @@ def main(argv: list[str] | None = None) -> int:
     if options.again is not None:
         seeds = options.again or list(tally.wrong)
     options.file.parent.mkdir(exist_ok=True)
+    if options.cluster:
+        rows = rows_on_cluster(options.cluster, seeds, options.seconds, options.limit)
+    else:
+        rows = rows_of(seeds, options.processes, options.seconds, options.limit)
     with options.file.open("a", encoding="utf-8") as file:
-        for row in rows_of(seeds, options.processes, options.seconds, options.limit):
-            made = row | {"commit": commit}
-            tally.add([made])
-            file.write(json.dumps(made) + "\n")
-            file.flush()
-            if wrongs(row):
-                print(json.dumps(row), flush=True)
+        try:
+            for row in rows:
+                made = row | {"commit": commit}
+                tally.add([made])
+                file.write(json.dumps(made) + "\n")
+                file.flush()
+                if wrongs(row):
+                    print(json.dumps(row), flush=True)
+        except (InputError, NotSolvedError) as fault:
+            parser.error(f"{fault}; {len(tally)} jobs are done, and the same command goes on behind them")
     if options.file == KEPT:
         write_summary(tally)
         KEPT.unlink()  # counted: the next run would count it again

@@ -23,6 +23,7 @@ from planner.planning.methods.registry import plan
 from planner.verifier import Kind as KindOfFault
 
 LAW_EVERY = 10  # jobs
+ROUNDING = 1e-9  # of a time [-]
 NO_JERK_LIMIT = ("second-order",)
 Row = dict[str, Any]
 
@@ -88,10 +89,20 @@ def _planned(made: Job) -> Row:
         "samples": len(found.trajectory),
         "said": found.verdict.sentences[0] if found.verdict.sentences else "",
         "second": second,
+        **bounded(found),
     }
     if not found.verdict.passed and (why := documented(made, found.verdict.kinds)):
         row |= {"outcome": DOCUMENTED, "why": why}
     return row | (_law(made, found) if made.seed % LAW_EVERY == 0 and found.verdict.passed else {})
+
+
+def bounded(found: Plan) -> Row:
+    """The proved bound beside a motion that passes: `above` it [-], and `below` where the motion is faster than it."""
+    least = found.least_time
+    if least is None or found.verdict is None or not found.verdict.passed:
+        return {}
+    above = found.cycle_time / least - 1.0
+    return {"above": above} | ({"below": above} if above < -ROUNDING else {})
 
 
 def documented(made: Job, kinds: frozenset[KindOfFault]) -> str:

@@ -7,6 +7,8 @@ import textwrap
 from collections import Counter
 from typing import Any
 
+import numpy as np
+
 from benchmarks.campaign.tally import (
     CRASH,
     DOCUMENTED,
@@ -20,6 +22,7 @@ from benchmarks.campaign.tally import (
 )
 from benchmarks.record import ROOT, markdown, write_results
 
+SHARES = (0.0, 0.1, 0.5, 0.9, 1.0)  # of motions, in the table of bounds
 REASONS = 40  # sentences at most
 WIDTH = 136  # characters of a line of the page
 WORDS = 200  # characters of what is said of a job
@@ -43,6 +46,15 @@ def write_summary(tally: Tally) -> None:
     laws = _laws(tally)
     if laws:
         text += markdown(["law", "jobs", "broken", "worst", "changed job fails"], laws) + "\n"
+    above = _above(tally)
+    if above:
+        columns = [
+            "way",
+            "motions with a bound",
+            "below it",
+            *(f"above, {share:.0%} of them" for share in SHARES),
+        ]
+        text += markdown(columns, above) + "\n"
     reasons = [[str(count), reason] for reason, count in tally.said.most_common(REASONS)]
     text += "Why jobs are refused or not solved (numbers left out):\n\n" + markdown(
         ["jobs", "sentence"], reasons
@@ -117,6 +129,20 @@ def _counts(tally: Tally, number: int) -> list[list[str]]:
     return [
         [name, str(counts.total()), *(str(counts[kind]) for kind in OUTCOMES), str(second[name])]
         for name, counts in sorted(outcomes.items(), key=lambda item: (item[0] == "all", item[0]))
+    ]
+
+
+def _above(tally: Tally) -> list[list[str]]:
+    """Rows of the table of bounds: how far the motions of a way are above what was proved."""
+    below = Counter(row.get("way", "?") for row in tally.wrong.values() if row.get("below"))
+    return [
+        [
+            way,
+            str(len(some)),
+            str(below[way]),
+            *(f"{100 * value:.2g} %" for value in np.quantile(some, SHARES)),
+        ]
+        for way, some in sorted(tally.above.items())
     ]
 
 

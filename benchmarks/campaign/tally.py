@@ -26,7 +26,7 @@ PASSED, FAILED, DOCUMENTED, UNSOLVED, REFUSED, CRASH, TOO_LONG = OUTCOMES = (
     "too long",
 )
 KEPT_OF_A_ROW = (
-    "seed", "source", "way", "outcome", "said", "second", "law", "law_broken", "law_said", "law_second", "cpu",
+    "seed", "source", "way", "outcome", "said", "second", "law", "law_broken", "law_said", "law_second", "below", "cpu",
 )  # fmt: skip
 BINS = 20  # of processor seconds, in a decade
 LEAST = 1e-3  # processor seconds below this are counted as this
@@ -40,7 +40,9 @@ def wrongs(row: Row) -> list[str]:
         return []
     found = [row["outcome"]] if row["outcome"] in (FAILED, CRASH, TOO_LONG) else []
     found += ["unexplained"] if row["outcome"] in (REFUSED, UNSOLVED) and not row.get("said") else []
-    return found + [name for name in ("second", "law_second", "law_broken", "law_said") if row.get(name)]
+    return found + [
+        name for name in ("second", "law_second", "law_broken", "law_said", "below") if row.get(name)
+    ]
 
 
 @dataclass
@@ -49,6 +51,7 @@ class Tally:
 
     right    : how many of each source, way and outcome
     laws     : how many of each law were kept
+    above    : by way how far the motions that have one are above their proved bound [-]
     said     : sentences of refused and unsolved jobs, numbers left out
     cpu      : how many took so many processor seconds, by the number of their bin
     cpu_sum  : of all of `right` [s]
@@ -61,6 +64,7 @@ class Tally:
 
     right: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     laws: Counter[str] = field(default_factory=Counter)
+    above: dict[str, list[float]] = field(default_factory=dict)
     said: Counter[str] = field(default_factory=Counter)
     cpu: Counter[int] = field(default_factory=Counter)
     cpu_sum: float = 0.0
@@ -86,6 +90,8 @@ class Tally:
             if seed in self:
                 self.again[seed] = row["outcome"]
                 continue
+            if "above" in row:
+                self.above.setdefault(job[1], []).append(float(f"{row['above']:.3g}"))
             if wrongs(row):
                 self.wrong[seed] = {key: row[key] for key in KEPT_OF_A_ROW if row.get(key) or key == "seed"}
                 continue
@@ -121,6 +127,7 @@ class Tally:
             "seeds": {outcome: _ranges(some) for outcome, some in sorted(self.seeds.items()) if some},
             "right": [[*key, count] for key, count in sorted(self.right.items()) if count],
             "laws": dict(self.laws),
+            "above": {way: self.above[way] for way in sorted(self.above)},
             "said": dict(self.said.most_common()),
             "cpu": {str(number): self.cpu[number] for number in sorted(self.cpu)},
             "cpu_sum": round(self.cpu_sum, 3),
@@ -145,6 +152,7 @@ class Tally:
         return cls(
             right=Counter({(source, way, outcome): count for source, way, outcome, count in data["right"]}),
             laws=Counter(data["laws"]),
+            above=data.get("above", {}),
             said=Counter(data["said"]),
             cpu=Counter({int(number): count for number, count in data["cpu"].items()}),
             cpu_sum=data["cpu_sum"],

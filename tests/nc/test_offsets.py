@@ -128,6 +128,13 @@ def test_refused(text: str, part: str) -> None:
     assert part in caught.value.message
 
 
+def test_angles_and_edges_of_tools_are_said_not_to_be_used() -> None:
+    """Only those that the line has, each with its line."""
+    program = parse_program(HEAD + "G10 L1 P3 Z7\nG10 L1 P4 Z7 J30 Q2\nG0 X5\n", MACHINE)
+    said = [note.partition(" is not used")[0] for note in program.notes if "is not used" in note]
+    assert said == ["line 4: J of G10 L1", "line 4: Q of G10 L1"]
+
+
 def test_tools_of_a_machine_are_numbers_or_tables() -> None:
     tools = MACHINE.tools
     assert (tools["1"].length, tools["1"].diameter, tools["2"].x) == (25.0, 0.0, 4.0)

@@ -12,11 +12,12 @@ from benchmarks.judge.setpoints import trajectory_of
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.limits import VELOCITY, Limits
-from planner.feedrate.constraints.on_grid import OnGrid
+from planner.feedrate.constraints.on_grid import OnGrid, remaining_budget
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
 from planner.motion import limits_used
 from planner.nc.reader import parse_program
+from planner.smoothing.spline_path import spline_shape, with_spline
 
 
 def grid_of(program, machine, resolution=1e-3):
@@ -52,6 +53,23 @@ def test_at_a_corner_chords_have_what_the_rounding_leaves_of_the_tolerance(theta
     assert 0.1 * machine.tolerance < off < machine.tolerance
     assert grid.sides()[1].tol_chord[corner] == pytest.approx(machine.tolerance - off, rel=1e-3)
     assert grid.sides()[1].tol_chord[~corner] == pytest.approx(machine.tolerance)
+
+
+def test_on_a_spline_chords_have_what_it_leaves_and_beside_it_all_of_the_tolerance():
+    machine = problems.machine()
+    program = problems.polyline([[0, 0], [40, 0], [40.5, 0.1], [41, 0.3], [41.4, 0.6], [60, 30]])
+    toolpath = toolpath_from_program(program, machine)
+    rounded = round_corners(toolpath, machine, BezierCorner(), blend_tangents=True)
+    path = with_spline(rounded, spline_shape(rounded, machine))
+    samples = sample_path(path, machine, 1e-2)
+    span = samples.element - len(samples.table.legs)
+    straight = (samples.element >= 0) & (span < 0)
+    assert (span >= 0).any()
+    assert straight.any()
+    left = remaining_budget(samples)
+    np.testing.assert_array_equal(left[span >= 0], path.spline.budget[span[span >= 0]])
+    assert left[span >= 0].max() < machine.tolerance
+    assert left[straight] == pytest.approx(machine.tolerance)
 
 
 def test_the_normal_acceleration_of_a_circle_is_told_as_it_is():

@@ -214,7 +214,7 @@ def test_a_run_shorter_than_the_shaper_is_left_by_slowing_down():
 @pytest.mark.slow
 def test_a_path_that_uses_little_of_the_tolerance_leaves_more_to_the_shaper():
     """With half of the tolerance for the path alone the spiral takes 2.73 s."""
-    made = plan(problems.star_spiral(300), SHAKEN, shaped=True)
+    made = plan(problems.star_spiral(300), SHAKEN, shaped=True, effort="quick")
     assert made.verdict.passed
     assert left(made) < LEFT
     assert made.cycle_time < 2.0

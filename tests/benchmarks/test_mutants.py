@@ -1,0 +1,77 @@
+"""Mutants: drawn alike for any count, one change each, none in what computes nothing; and what tests in a copy make of one."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from benchmarks.mutants import SAME, counts, reasons
+from benchmarks.mutants.draw import AREAS, Mutant, drawn
+from benchmarks.mutants.trial import KILLED, NO_END, SURVIVED, outcome, room_of
+from benchmarks.record import ROOT
+
+
+@pytest.mark.parametrize("area", AREAS)
+def test_every_area_has_mutants_that_are_python(area: str) -> None:
+    few, more = drawn(area, 3), drawn(area, 25)
+    assert more[:3] == few
+    assert len({mutant.key for mutant in more}) == len(more) == 25
+    for mutant in more:
+        text = (ROOT / mutant.file).read_text(encoding="utf-8")
+        changed = mutant.of(text)
+        assert ast.dump(ast.parse(changed)) != ast.dump(ast.parse(text)), mutant.key
+        assert sum(a != b for a, b in zip(text.splitlines(), changed.splitlines(), strict=True)) == 1
+
+
+def test_a_mutant_of_another_source_is_refused() -> None:
+    (mutant,) = drawn("judge", 1)
+    with pytest.raises(ValueError, match="the source is another one"):
+        mutant.of("\n" * mutant.line)
+
+
+def test_tests_are_those_of_the_module_and_of_its_room() -> None:
+    assert "tests/sensitivity/test_least_time.py" in room_of("planner/sensitivity/straight_time.py")[:3]
+    found = room_of("planner/verifier/stops.py")
+    assert "tests/verifier/test_faults_of_order.py" in found
+    assert all(name.startswith("tests/") for name in found)
+
+
+@pytest.mark.parametrize(
+    ("new", "expected"),
+    [(" - ", KILLED), (" + 0 * ", KILLED), (" + 0 + ", SURVIVED), (" + forever() + ", NO_END)],
+)
+def test_what_becomes_of_a_mutant(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, new: str, expected: str
+) -> None:
+    """In a process of its own, which leaves this one and the copy as they were. Tests that fail without it can be left out."""
+    monkeypatch.setattr("benchmarks.mutants.trial.CPU", 4)
+    source = "def forever():\n    while True:\n        pass\n\n\ndef total(a, b):\n    return a + b\n"
+    (tmp_path / "summed.py").write_text(source)
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "test_summed.py").write_text(
+        "from summed import total\n\ndef test_total():\n    assert total(2, 3) == 5\n\ndef test_broken():\n    assert False\n"
+    )
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow\n")
+    mutant = Mutant(area="judge", file="summed.py", line=7, column=12, old=" + ", new=new)
+    became, by, cpu = outcome(mutant, tmp_path, ["tests/test_summed.py"], {"test_summed.py::test_broken"})
+    assert (became, by) == (expected, "test_summed.py::test_total" if expected == KILLED else by)
+    assert cpu > 0.0
+    assert (tmp_path / "summed.py").read_text() == source
+
+
+def test_shares_leave_out_mutants_that_change_nothing() -> None:
+    key, found = next(iter(reasons().items()), ("", {}))
+    rows = [
+        {"area": "judge", "key": str(n), "became": became}
+        for n, became in enumerate((KILLED, NO_END, SURVIVED))
+    ]
+    assert counts(rows)[-1] == ["all", "3", "1", "1", "0", "1", "33.3 %"]
+    if found.get("kind") == SAME:
+        assert counts([*rows, rows[2] | {"key": key}])[-1][4:] == ["1", "1", "33.3 %"]
+
+
+def test_reasons_are_of_mutants_that_survived() -> None:
+    assert {found["kind"] for found in reasons().values()} <= {SAME, "open"}
+    assert all(found["why"] for found in reasons().values())

@@ -89,6 +89,7 @@ def test_parts_add_up():
     assert 0.5 * -share * prices.feed < prices.places.feed.sum() <= -share * prices.feed * (1 + 1e-9)
     assert prices.places.tolerance.sum() == pytest.approx(prices.tolerance, rel=1e-9)
     assert (prices.places.limits >= prices.places.feed).all()
+    assert (prices.places.limits > 0.0).all()  # on every leg
     for name, saved in prices.saved.items():
         least, most = prices.ranges[name]
         assert least <= saved <= most

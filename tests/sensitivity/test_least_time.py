@@ -19,11 +19,11 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Fir, Machine, load_machine
 from planner.nc.program import Program
 from planner.planning.job.plan import Plan
-from planner.sensitivity.corner_speeds import confined
+from planner.sensitivity.corner_speeds import confined, legs_between
 from planner.sensitivity.least_time import least_time
 from planner.sensitivity.straight_time import Bounds, End, straight_time
 from planner.sensitivity.turning_back import extremes
-from planner.sensitivity.waypoints import way_of
+from planner.sensitivity.waypoints import Way, way_of
 
 MILL = load_machine("mill")
 WAYS = (
@@ -157,6 +157,19 @@ def test_a_coordinate_that_isconfined_may_be_so_fast() -> None:
         confined(way, np.array([[0.0, 3.0, 0.0]]), np.array([eps]), np.array([lasting * 0.5]))[0]
         > 10.0 * fast
     )
+
+
+def test_where_the_way_turns_right_back_the_larger_tolerance_says_how_fast() -> None:
+    """What is within w of a point and brakes at a has at most v^2 = 2 a 2 w there."""
+    tolerance, push = np.array([0.01, 0.01, 0.09]), 2000.0
+    way = Way(
+        point=np.array([[0.0, 0.0], [20.0, 0.0], [0.0, 0.0]]), tolerance=tolerance, stop=np.array([True, False, True]),
+        vertex=np.ones(3, dtype=bool), tangent=np.array([[1.0, 0.0], [-1.0, 0.0]]), length=np.full(2, 20.0), feed=np.full(2, 500.0),
+        line=np.ones(2, dtype=bool), limit=np.repeat([[500.0], [push], [1e9]], 2, axis=1),
+    )  # fmt: skip
+    legs = legs_between(way, way.along(way.tangent, way.feed)[0], way.length, np.ones(2, dtype=bool))
+    fastest = np.sqrt(4.0 * push * tolerance.max())
+    assert (legs.end.speed[0], legs.begin.speed[1]) == (pytest.approx(fastest), pytest.approx(fastest))
 
 
 def test_a_coordinate_is_as_fast_as_any_velocity_makes_it() -> None:

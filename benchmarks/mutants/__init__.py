@@ -27,12 +27,16 @@ from benchmarks.record import RESULTS, markdown, planner_state, write_results
 NAME = "mutants"
 KEPT = RESULTS / f"{NAME}.json"
 REASONS = Path(__file__).with_name("reasons.toml")
-SAME = "same"  # kind of a reason: nothing that is promised changes
+SAME, ELSEWHERE, OPEN = (
+    "same",
+    "elsewhere",
+    "open",
+)  # nothing that is promised changes; another room finds it; neither
 Row = dict[str, Any]
 
 
 def reasons() -> dict[str, dict[str, str]]:
-    """Of survivors by key: `kind`, which is `SAME` or "open", and `why`."""
+    """Of survivors by key: `kind` (`SAME`, `ELSEWHERE` or `OPEN`) and `why`."""
     found: dict[str, dict[str, str]] = tomllib.loads(REASONS.read_text(encoding="utf-8"))
     return found
 
@@ -43,10 +47,10 @@ def counts(rows: list[Row]) -> list[list[str]]:
     for area in [*AREAS, "all"]:
         own = [row for row in rows if area in (row["area"], "all")]
         became = Counter(row["became"] for row in own)
-        same = sum(row["became"] == SURVIVED and why.get(row["key"], {}).get("kind") == SAME for row in own)
-        left = became[SURVIVED] - same
-        share = f"{100 * left / max(len(own) - same, 1):.1f} %"
-        table.append([area, *map(str, (len(own), became[KILLED], became[NO_END], same, left)), share])
+        kinds = Counter(why.get(row["key"], {}).get("kind", OPEN) for row in own if row["became"] == SURVIVED)
+        share = f"{100 * kinds[OPEN] / max(len(own) - kinds[SAME], 1):.1f} %"
+        shown = (len(own), became[KILLED], became[NO_END], kinds[ELSEWHERE], kinds[SAME], kinds[OPEN])
+        table.append([area, *map(str, shown), share])
     return table
 
 
@@ -58,10 +62,11 @@ def page(rows: list[Row]) -> str:
         "mutants",
         "killed by a test",
         "killed: no end",
+        "killed in another room",
         "survived: the same",
         "survived",
-        "share of those that differ",
     ]
+    columns += ["share of those that differ"]
     lines = [
         f"| {row['key'].replace('|', '/')} | {why.get(row['key'], {}).get('why', '')} |"
         for row in rows
@@ -69,7 +74,7 @@ def page(rows: list[Row]) -> str:
     ]
     return (
         markdown(columns, counts(rows))
-        + "\nKilled by the quick tests of the room alone: what only slow tests or those of other rooms find counts as survived.\n\n"
+        + "\nKilled by the quick tests of the room alone: what only others find counts as survived until a reason names the test.\n\n"
         + "\n".join(["| survived | why |", "|---|---|", *lines])
         + "\n"
     )

@@ -56,13 +56,14 @@ def copy_of_checkout(where: Path) -> Iterator[Path]:
 
 
 def room_of(file: str) -> list[str]:
-    """Test files for a file of the package: those that name its module, and those of the folder that mirrors its own."""
+    """Test files for a file of the package: those that name its module, that have a folder of it in their name, or mirror its own."""
     module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
     mirror = (ROOT / "tests").joinpath(*Path(file).parts[1:-1])
     while not list(mirror.glob("test_*.py")):
         if any(mirror.rglob("test_*.py")) or mirror == ROOT / "tests":
             break
         mirror = mirror.parent
+    rooms = set(Path(file).parts[1:-1])
     score: dict[str, float] = {}
     parent, _, stem = module.rpartition(".")
     names = re.compile(rf"\b{re.escape(module)}\b|\b{re.escape(parent)} import [^\n]*\b{stem}\b")
@@ -78,7 +79,7 @@ def room_of(file: str) -> list[str]:
             + 0.2 * told
             + (3.0 if near else 0.0)
         )
-        if names.search(text) or (near and own > 0):
+        if names.search(text) or (near and own > 0) or rooms & set(test.stem.split("_")):
             score[test.relative_to(ROOT).as_posix()] = own
     return sorted(score, key=lambda name: (-score[name], name))[:FILES]
 
@@ -142,6 +143,7 @@ def _child(folder: Path, tests: list[str], log: Path, marks: str) -> None:
         import pytest
 
         options = [
+            "-rfE",  # names what failed
             "-q",
             "-x",
             "-m",

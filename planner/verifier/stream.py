@@ -132,10 +132,11 @@ class Watch:
         self._travelled = float(block.travelled_to()[-1])
 
     def _take_feeds(self, block: SampleBlock, place: Located, cut: FloatArray, state: FloatArray) -> None:
-        speed, nothing = np.full(len(block.t), np.nan), np.zeros((2, len(block.t)))
+        t, speed = block.t, np.full(len(block.t), np.nan)
         if self._limits.judged[0]:
             speed = np.sqrt(np.einsum("na,na->n", block.velocity, block.velocity))
-        chords = Chords(block.t, *nothing, speed, place.piece, place.first, place.last, cut, state)
+        none, (piece, _, first, last) = np.zeros_like(t), place
+        chords = Chords(t, none, none.copy(), speed, piece, first, last, cut, state)
         self._feeds.take(chords, block.skip)
 
     def _take_between(

@@ -155,8 +155,8 @@ def siemens_mark(words: Words, source: str) -> str:
         np.flatnonzero((words.letter == FAULT) | np.isin(words.letter, (ord("%"), ord("O"))))
     )
     marked = (row for row in odd if _SIEMENS.match(words.row_text(row)))
-    row = next(marked, None)
-    return "" if row is None else f"line {words.line[row]}, {words.row_text(row).strip()[:_SHOWN]!r}"
+    first = next(marked, None)
+    return "" if first is None else f"line {words.line[first]}, {words.row_text(first).strip()[:_SHOWN]!r}"
 
 
 def without_leader(data: bytes, reading: Reading) -> tuple[bytes, str]:

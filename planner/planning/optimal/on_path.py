@@ -46,9 +46,7 @@ class OnPath:
 
     def without_prices(self) -> OnPath:
         """The same without what the solver knows of prices, 150 bytes a point."""
-        return dataclasses.replace(
-            self, solution=dataclasses.replace(self.solution, prices=None, multipliers=None)
-        )
+        return dataclasses.replace(self, solution=dataclasses.replace(self.solution, multipliers=None))
 
     def motion(self) -> Motion:
         """The motion in time; the problem must be solved."""

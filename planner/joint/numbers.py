@@ -13,8 +13,9 @@ ROUNDING = 1e-4
 # Weights of what the motion does for no time, against the time [-]: of the squares of all jerks, as shares of
 # their limits, on steps that run at the programmed feed and on all others; and of half the square of how far
 # nodes are from their leg, as a share of the tolerance. So jerk is small, and positions are near the path,
-# where time does not depend on them; elsewhere these cost less than 1e-4 of the time, on the mean.
-SMOOTH_AT_FEED, SMOOTH, CENTRE = 1e-2, 3e-4, 1e-3
+# where time does not depend on them. Where all of the tolerance saves the share g of the time, the last leaves
+# g - g^2/CENTRE of that unused, CENTRE/4 at most; the others cost less than 1e-4, on the mean.
+SMOOTH_AT_FEED, SMOOTH, CENTRE = 1e-2, 3e-4, 3e-4
 # A step whose ends are as fast as this share of the feed runs at it [-].
 AT_FEED = 0.995
 

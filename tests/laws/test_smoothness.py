@@ -34,9 +34,10 @@ def rms_jerk(plan: planner.Plan, least: float = 0.0) -> float:
 
 @pytest.mark.shows("smoothness", "sampled: on chosen jobs")
 def test_at_the_feed_jerk_is_small_for_no_time(monkeypatch: pytest.MonkeyPatch):
-    """Against a search that minds it as little as on ramps: a quarter less jerk, at less than 1e-4 of the time."""
+    """Against a search that does not mind it: a quarter less jerk, at less than 1e-4 of the time."""
     smooth = planned(WAVE)
-    monkeypatch.setattr(numbers, "SMOOTH_AT_FEED", numbers.SMOOTH)
+    monkeypatch.setattr(numbers, "SMOOTH_AT_FEED", 0.0)
+    monkeypatch.setattr(numbers, "SMOOTH", 0.0)
     rough = planned(WAVE)
     assert rms_jerk(smooth, AT) <= 0.75 * rms_jerk(rough, AT)
     assert smooth.cycle_time <= rough.cycle_time * (1.0 + 1e-4)
@@ -70,3 +71,15 @@ def test_smooth_trades_time_for_jerk():
 def test_smooth_without_the_joint_search_is_said():
     made = planned(RETRACT, smooth=0.1, geometry="spline")
     assert any("smooth has no effect" in note for note in made.notes)
+
+
+def test_the_pull_to_the_path_costs_no_time():
+    """Circles at the feed: time is what the tolerance saves, 5e-4 of it; the pull leaves a quarter of its weight at most."""
+    radius, feed, tolerance = 20.0, 20.0, 0.01
+
+    def lasting(turns: int) -> float:
+        text = f"G21 G90 G64 P{tolerance}\nF{60 * feed:g}\n" + f"G2 X0 Y0 I{radius} J0\n" * turns
+        return planned(text).cycle_time
+
+    least = 2.0 * 2.0 * np.pi * (radius - tolerance) / feed
+    assert least * (1.0 - 1e-5) <= lasting(3) - lasting(1) <= least * (1.0 + 1e-4)

@@ -25,7 +25,7 @@ from benchmarks.net.golden_net import SAME, Row, jobs, read, row_of
 from benchmarks.record import markdown, write_results
 from planner.base.threads import use_threads
 from planner.delivery import mending
-from planner.joint import normal_rows, own, refine, run
+from planner.joint import guess, normal_rows, own, run
 from planner.planning import attempts, joint_search
 from planner.planning.attempt import Attempt
 from planner.planning.attempts import RETRIES
@@ -103,7 +103,8 @@ def _stay_free() -> None:
 # Numbers, by the trace's step of the jobs in which they count: what is planned without them.
 NUMBERS: dict[str, tuple[str, Switch]] = {
     "STAY, STAY_PRICED": ("search", _stay_free),
-    "MOST": ("search", _set(refine, "MOST", run.HALF)),
+    "PERIODS": ("search", _set(guess, "PERIODS", 0.0)),
+    "MORE": ("search", _set(own, "MORE", 1.0)),
     "PASSED": ("search", _set(run, "PASSED", 0.0)),
     "SHORTENED": ("search", _set(own, "SHORTENED", np.inf)),
     "LASTS": ("search", _set(own, "LASTS", 1e-9)),

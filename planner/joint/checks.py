@@ -35,6 +35,8 @@ class Keeps(NamedTuple):
     curvature: FloatArray  # (R,)
     vertex_budget: FloatArray  # (R+1,)
     passed: Array  # (R,)
+    lag: FloatArray  # (K, 2) of the filters (run.py) [s], [-]
+    chord: float  # half of one [s]
 
 
 @njit(cache=True, error_model="numpy")
@@ -76,19 +78,6 @@ def _of_limits(keeps, r, h, v, a, j):
         if slope < 0.0:
             at = min(max(at - along / slope, 0.0), h)
     return max(worst, np.sqrt(max(best, _at(v, a, j, at)[0])) / keeps.feed[r])
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def normal_shares(keeps, leg, h, state, jerk):
-    """(N,) the largest share in every step of the limit of the normal acceleration; leg (N,),
-    h (N,), state (N+1, 3, A), jerk (N, A)."""
-    shares = np.zeros(len(leg))
-    for i in range(len(leg)):
-        for n in range(PLACES):
-            square, _, across = _at(state[i, 1], state[i, 2], jerk[i], h[i] * n / (PLACES - 1))
-            if square > 0.0 and across > 0.0:
-                shares[i] = max(shares[i], np.sqrt(across / square) / keeps.normal[leg[i]])
-    return shares
 
 
 @njit(cache=True, error_model="numpy")
@@ -188,29 +177,68 @@ def _of_line(keeps, r, c, places, end, budgets, work):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def worst_shares(keeps, leg, h, state, jerk, place):
-    """The largest share of a limit in N steps, and of the tolerance in each of them (N,).
+    """The largest share of a limit in N steps, and of the tolerance in each of them (2, N): at setpoints, and on the chords
+    between them.
 
     leg (N,), h (N,), state (N+1, 3, A), jerk (N, A); place (N, 3) of the nodes and the inner control points
     along the leg: where places on arcs are sought from; whether the first node is where its leg begins, on a line (0)
     """
     N, axes = jerk.shape
-    limit, before, tube = 0.0, 0.0, np.zeros(N)
+    limit, tube, x = 0.0, np.zeros((2, N)), np.empty((N + 1, 3 * axes))
+    for i in range(N):
+        limit = max(limit, _of_limits(keeps, leg[i], h[i], state[i, 1], state[i, 2], jerk[i]))
+    for seen in range(2):
+        x[:] = 0.0
+        for i in range(N + 1):
+            x[i, 2 * axes :] = state[i, 2]
+            if not seen:
+                x[i, :axes] = state[i, 0]
+        for k in range(len(keeps.lag) * seen):
+            for side in (-1.0, 1.0):
+                _add_later(h, state, jerk, keeps.lag[k, 0] + side * keeps.chord, 0.5 * keeps.lag[k, 1], x)
+        for i in range(N):  # between nodes they are off the motion by a linear share
+            for k in range(axes):
+                off = x[i + 1, k] - state[i + 1, 0, k] - (x[i, k] - state[i, 0, k])
+                x[i, axes + k] = state[i, 1, k] + off / h[i]
+        _put_tube(keeps, leg, h, x, place, tube[seen])
+    return limit, tube
+
+
+@njit(cache=True, error_model="numpy")
+def _add_later(h, state, jerk, later, weight, x):
+    """Positions `later` [s] than the nodes, times a weight, are added to x (N+1, ..); beyond the steps there are, the
+    acceleration stays as at their end."""
+    N, axes, n = len(h), jerk.shape[1], 0
+    node = np.append(0.0, np.cumsum(h))
+    for i in range(N + 1):
+        at = node[i] + later
+        while n < N and node[n + 1] <= at:
+            n += 1
+        t = at - node[n]
+        for k in range(axes):
+            j = jerk[n, k] if n < N and t >= 0.0 else 0.0
+            p, v, a = state[n, 0, k], state[n, 1, k], state[n, 2, k]
+            x[i, k] += weight * (p + t * (v + t * (0.5 * a + t * j / 6.0)))
+
+
+@njit(cache=True, error_model="numpy")
+def _put_tube(keeps, leg, h, x, place, tube):
+    """Into `tube` (N,) the shares that steps use of the tolerance whose states at their beginnings are x (N+1, 3 A)."""
+    N, axes, before = len(h), x.shape[1] // 3, 0.0
     c, budgets = np.empty((4, axes)), np.empty(2)
     work = (
         *(np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes)),
         *(np.zeros((4, axes)), np.zeros((4, 1)), np.zeros((4, 1))),
     )
-    on_line, x = np.zeros((N, 3)), state.copy().reshape(N + 1, 3 * axes)
+    on_line = np.zeros((N, 3))
     last = put_places(keeps.legs, leg, place[0, 0] <= 0.0, x, h, on_line, np.zeros((N, 3), np.bool_))
     for i in range(N):
-        r = leg[i]
-        limit = max(limit, _of_limits(keeps, r, h[i], state[i, 1], state[i, 2], jerk[i]))
+        r, third = leg[i], h[i] / 3.0
         begins, ends = i > 0 and leg[i - 1] != r, i < N - 1 and leg[i + 1] != r
-        third = h[i] / 3.0
         for k in range(axes):
-            p, q = state[i, 0, k], state[i + 1, 0, k]
-            c[0, k], c[1, k] = p, p + third * state[i, 1, k]
-            c[2, k], c[3, k] = q - third * state[i + 1, 1, k], q
+            c[0, k], c[1, k] = x[i, k], x[i, k] + third * x[i, axes + k]
+            c[2, k] = x[i, k] + third * (2.0 * x[i, axes + k] + 1.5 * third * x[i, 2 * axes + k])
+            c[3, k] = x[i + 1, k]
         budgets[:] = keeps.budget[r]
         if begins:
             before, budgets[0] = 0.0, min(budgets[0], keeps.vertex_budget[r])
@@ -221,10 +249,10 @@ def worst_shares(keeps, leg, h, state, jerk, place):
         end = keeps.legs.length[r] if ends else max(place[i, 2], before)
         if keeps.passed[r]:
             end = place[i, 0] + 3.0 * (place[i, 1] - place[i, 0])
-            tube[i], before = _of_passed(keeps, r, c, place[i, 0], end, budgets, work)
+            share, before = _of_passed(keeps, r, c, place[i, 0], end, budgets, work)
         elif keeps.legs.radius[r] > 0.0:
-            tube[i], before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
+            share, before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
         else:
             end = keeps.legs.length[r] if ends else last if i == N - 1 else on_line[i + 1, 0]
-            tube[i] = _of_line(keeps, r, c, on_line[i], end, budgets, work)
-    return limit, tube
+            share = _of_line(keeps, r, c, on_line[i], end, budgets, work)
+        tube[i] = share

@@ -4,11 +4,18 @@ grad g' (recursion.py); forces.py has the sum of q grad g, and what they change 
 All three go through the vectors y of the rows, which are linear in p, v, a, j for a given h (rows.py). What is f by the
 vectors is, by p, v, a, j and h, for every axis (`spread`)
 
-    p   f_P + f_C1 + f_C2
-    v   f_V + f_MID + f_1 + f_2 + f_3 + h f_C1/3 + 2 h f_C2/3
-    a   f_A + h f_MID/2 + h f_1/4 + h f_2/2 + 3 h f_3/4 + h2 f_C2/6
+    v   f_V + f_MID + f_1 + f_2 + f_3
+    a   f_A + h f_MID/2 + h f_1/4 + h f_2/2 + 3 h f_3/4
     j   f_J + h2 f_2/12 + h2 f_3/4
-    h   e.f,   e = a/2, a/4, a/2 + h j/6, 3 a/4 + h j/2 of MID, 1, 2, 3;  v/3, (2 v + h a)/3 of C1, C2
+    h   e.f,   e = a/2, a/4, a/2 + h j/6, 3 a/4 + h j/2 of MID, 1, 2, 3
+
+and by a set of the tolerance, of the state q = p + k a, w = v + k j, a (`of_state`)
+
+    p   f_q                        f_q = f_P + f_C1 + f_C2
+    v   f_w                        f_w = h f_C1/3 + 2 h f_C2/3
+    a   h2 f_C2/6 + k f_q
+    j   k f_w
+    h   (w f_C1 + (2 w + h a) f_C2)/3
 
 and so are the blocks of the model, of what G is between the vectors.
 """
@@ -30,6 +37,7 @@ from planner.joint.row_kinds import (
     NORMAL_ROWS,
     ORDER_MID,
     ORDER_NODE,
+    SETS,
     SIDE,
     SIXTH,
     SWITCH,
@@ -41,11 +49,16 @@ from planner.joint.rows import bent_at, of_axis, tangent_of, turn_of
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def spread(h, f_mid, f_1, f_2, f_3, f_c1, f_c2):
-    """By p, v, a and j what is f by the vectors that are of several of them (module text)."""
-    by_v = f_mid + f_1 + f_2 + f_3 + THIRD * h * (f_c1 + 2.0 * f_c2)
-    by_a = h * (0.5 * (f_mid + f_2) + 0.25 * f_1 + 0.75 * f_3) + SIXTH * h * h * f_c2
-    return f_c1 + f_c2, by_v, by_a, h * h * (TWELFTH * f_2 + 0.25 * f_3)
+def spread(h, f_mid, f_1, f_2, f_3):
+    """By v, a and j what is f by the vectors that are of several of them (module text)."""
+    by_a = h * (0.5 * (f_mid + f_2) + 0.25 * f_1 + 0.75 * f_3)
+    return f_mid + f_1 + f_2 + f_3, by_a, h * h * (TWELFTH * f_2 + 0.25 * f_3)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def of_state(sag, by_q, by_w, by_a, by_j):
+    """By p, v, a and j what is that by the state of a set (module text)."""
+    return by_q, by_w, by_a + sag * by_q, by_j + sag * by_w
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -58,23 +71,25 @@ def _add_square(sizes, W, row, by):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _put_bent_row(sizes, group, rows, i, which, x, u, row):
-    """row (4 A + 1,) = the derivative of a row on an arc: of the inner control points (1 and 2), of ORDER_NODE, ORDER_MID and
-    ARC (3 to 5)."""
+def _put_bent_row(sizes, group, rows, i, which, m, x, u, row):
+    """row (4 A + 1,) = the derivative of a row on an arc: of the inner control points (1 and 2) of set m, of ORDER_NODE,
+    ORDER_MID and ARC (3 to 5)."""
     axes = len(sizes.axes)
     h = u[axes]
     by_h = 0.0 * h
     for k in range(axes):
         v, a, j = x[axes + k], x[2 * axes + k], u[k]
         by_p, by_v, by_a, by_j = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h
-        if which == 1:  # C1 and P
-            n = rows.n[i, 1, k]
-            by_p, by_v, by_h = n + rows.node[i, 1, k], THIRD * h * n, by_h + THIRD * v * n
-        elif which == 2:  # C2 and NEXT
-            n, m = rows.n[i, 2, k], rows.node[i, 2, k]
-            by_p, by_v = n + m, h * (2.0 * THIRD * n + m)
-            by_a, by_j = h * h * (SIXTH * n + 0.5 * m), h * h * h * SIXTH * m
-            by_h += THIRD * (2.0 * v + h * a) * n + (v + h * (a + 0.5 * h * j)) * m
+        if which <= 2:
+            n, f = rows.n[i, 3 * m + which, k], rows.node[i, 3 * m + which, k]
+            w = v + group.sag[m] * j
+            if which == 1:  # and the node
+                by_p, by_v, by_h = n + f, THIRD * h * n, by_h + THIRD * w * n
+            else:  # and the next one
+                by_p, by_v = n + f, h * (2.0 * THIRD * n + f)
+                by_a, by_j = h * h * (SIXTH * n + 0.5 * f), h * h * h * SIXTH * f
+                by_h += THIRD * (2.0 * w + h * a) * n + (w + h * (a + 0.5 * h * j)) * f
+            by_p, by_v, by_a, by_j = of_state(group.sag[m], by_p, by_v, by_a, by_j)
         elif which == 3:
             by_v = -tangent_of(sizes, group, rows, i, 0, k) / group.pace[i]
         elif which == 4:
@@ -112,13 +127,96 @@ def _weight(rows, i, r, per):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _tube_weights(sizes, group, rows, i, m, x, u, bent):
+    """Of the three rows of a set, the node, and the inner control points: the weights of n n', of the identity and, taken
+    off, of tt' with the leg's tangent t, as the nearest place moves along that; n.e and t.e of the inner ones."""
+    axes, z, per_s = len(sizes.axes), rows.z[i], rows.per_s[i]
+    h, row, sag = u[axes], 8 * axes + TUBE_NODE + 3 * m, group.sag[m]
+    pull = group.centre[i] if m == 0 else 0.0 * h
+    flat_0, flat_1, flat_2 = (
+        (z[row] + pull) * group.room_node[i],
+        z[row + 1] * group.room[i],
+        z[row + 2] * group.room[i],
+    )
+    s_0, s_1, s_2 = z[row] * per_s[row], z[row + 1] * per_s[row + 1], z[row + 2] * per_s[row + 2]
+    if bent:  # rows of two vectors are added by themselves
+        alone = where(group.bent[i] > 0.0, 0.0, 1.0 + 0.0 * h)
+        s_1, s_2 = s_1 * alone, s_2 * alone
+    long_0, long_1, long_2 = 0.0 * h, 0.0 * h, 0.0 * h  # |t|^2
+    n_1, n_2, t_1, t_2 = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h
+    for k in range(axes):
+        at_0, at_1 = (
+            tangent_of(sizes, group, rows, i, 3 * m, k),
+            tangent_of(sizes, group, rows, i, 3 * m + 1, k),
+        )
+        at_2 = tangent_of(sizes, group, rows, i, 3 * m + 2, k)
+        long_0, long_1, long_2 = long_0 + at_0 * at_0, long_1 + at_1 * at_1, long_2 + at_2 * at_2
+        w = x[axes + k] + sag * u[k]
+        e_1, e_2 = THIRD * w, THIRD * (2.0 * w + h * x[2 * axes + k])
+        n_1, n_2 = n_1 + rows.n[i, 3 * m + 1, k] * e_1, n_2 + rows.n[i, 3 * m + 2, k] * e_2
+        t_1, t_2 = t_1 + at_1 * e_1, t_2 + at_2 * e_2
+    one = 1.0 + 0.0 * h
+    slide_0 = flat_0 * rows.moves[i, 3 * m] / where(long_0 > 0.0, long_0, one)
+    slide_1 = flat_1 * rows.moves[i, 3 * m + 1] / where(long_1 > 0.0, long_1, one)
+    slide_2 = flat_2 * rows.moves[i, 3 * m + 2] / where(long_2 > 0.0, long_2, one)
+    return (s_0, s_1, s_2), (flat_0, flat_1, flat_2), (slide_0, slide_1, slide_2), (n_1, n_2), (t_1, t_2)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _tube_block(sizes, group, rows, i, m, weights, h, k, t):
+    """The second derivatives of a set's rows by axes k and t of p, v, a and j: pp, vp, ap, jp, vv, av, jv, aa, ja, jj."""
+    s, flat, slide, _, _ = weights
+    sag, c = group.sag[m], 3 * m
+    at_k, at_t = tangent_of(sizes, group, rows, i, c, k), tangent_of(sizes, group, rows, i, c, t)
+    g_0 = s[0] * rows.n[i, c, k] * rows.n[i, c, t] - slide[0] * at_k * at_t
+    at_k, at_t = tangent_of(sizes, group, rows, i, c + 1, k), tangent_of(sizes, group, rows, i, c + 1, t)
+    g_1 = s[1] * rows.n[i, c + 1, k] * rows.n[i, c + 1, t] - slide[1] * at_k * at_t
+    at_k, at_t = tangent_of(sizes, group, rows, i, c + 2, k), tangent_of(sizes, group, rows, i, c + 2, t)
+    g_2 = s[2] * rows.n[i, c + 2, k] * rows.n[i, c + 2, t] - slide[2] * at_k * at_t
+    if t == k:
+        g_0, g_1, g_2 = g_0 + flat[0], g_1 + flat[1], g_2 + flat[2]
+    third, sixth = THIRD * h, SIXTH * h * h
+    qq, wq, aq = g_0 + g_1 + g_2, third * (g_1 + 2.0 * g_2), sixth * g_2
+    ww, aw, aa = third * third * (g_1 + 4.0 * g_2), 2.0 * third * sixth * g_2, sixth * sixth * g_2
+    av = aw + sag * wq
+    return (
+        qq,
+        wq,
+        aq + sag * qq,
+        sag * wq,
+        ww,
+        av,
+        sag * ww,
+        aa + sag * (2.0 * aq + sag * qq),
+        sag * av,
+        sag * sag * ww,
+    )
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _tube_by_h(sizes, group, rows, i, m, weights, x, u, k):
+    """The second derivatives of a set's rows by h and axis k of p, v, a and j, and what that adds to the one by h."""
+    axes, sag, c = len(sizes.axes), group.sag[m], 3 * m
+    _, flat, slide, n_e, t_e = weights
+    s = weights[0]
+    h, w, none = u[axes], x[axes + k] + sag * u[k], 0.0 * u[axes]
+    e_1, e_2 = THIRD * w, THIRD * (2.0 * w + h * x[2 * axes + k])
+    f_1 = s[1] * n_e[0] * rows.n[i, c + 1, k] + flat[1] * e_1
+    f_1 -= slide[1] * t_e[0] * tangent_of(sizes, group, rows, i, c + 1, k)
+    f_2 = s[2] * n_e[1] * rows.n[i, c + 2, k] + flat[2] * e_2
+    f_2 -= slide[2] * t_e[1] * tangent_of(sizes, group, rows, i, c + 2, k)
+    by = of_state(sag, f_1 + f_2, THIRD * h * (f_1 + 2.0 * f_2), SIXTH * h * h * f_2, none)
+    return by, e_1 * f_1 + e_2 * f_2
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_model(sizes, group, rows, i, x, u, W, row):
     """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i with the node x (3 A,) and the controls u (A+1,); row
     (4 A + 1,) is overwritten."""
     axes, z, per_s = len(sizes.axes), rows.z[i], rows.per_s[i]
     more, at, h = 8 * axes, 4 * axes, u[axes]
     bent = bent_at(sizes, group, i)
-    square, third, sixth = h * h, THIRD * h, SIXTH * h * h
+    square = h * h
     s_v = _weight(rows, i, more + FEED_NODE, group.feed_node[i])
     s_1 = _weight(rows, i, more + FEED_ROWS, rows.per_radius[i, 0])
     s_2 = _weight(rows, i, more + FEED_ROWS + 1, rows.per_radius[i, 1])
@@ -127,85 +225,69 @@ def put_model(sizes, group, rows, i, x, u, W, row):
     flat_1 = z[more + FEED_ROWS] * rows.per_radius[i, 0]
     flat_2 = z[more + FEED_ROWS + 1] * rows.per_radius[i, 1]
     flat_3 = z[more + FEED_ROWS + 2] * rows.per_radius[i, 2]
-    flat_p = (z[more + TUBE_NODE] + group.centre[i]) * group.room_node[i]
-    flat_c1, flat_c2 = z[more + TUBE_NODE + 1] * group.room[i], z[more + TUBE_NODE + 2] * group.room[i]
-    s_p = z[more + TUBE_NODE] * per_s[more + TUBE_NODE]
-    s_c1 = z[more + TUBE_NODE + 1] * per_s[more + TUBE_NODE + 1]
-    s_c2 = z[more + TUBE_NODE + 2] * per_s[more + TUBE_NODE + 2]
-    if bent:  # rows of two vectors are added below
-        alone = where(group.bent[i] > 0.0, 0.0, 1.0 + 0.0 * h)
-        s_c1, s_c2 = s_c1 * alone, s_c2 * alone
-    long_0, long_1, long_2 = 0.0 * h, 0.0 * h, 0.0 * h  # |tangent|^2
-    y_1, y_2, y_3, n_1, n_2 = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h  # products with e
-    t_1, t_2 = 0.0 * h, 0.0 * h
+    of_0 = _tube_weights(sizes, group, rows, i, 0, x, u, bent)
+    of_1 = _tube_weights(sizes, group, rows, i, 1, x, u, bent)
+    y_1, y_2, y_3 = 0.0 * h, 0.0 * h, 0.0 * h  # products with e
     for k in range(axes):
-        v, a, j = x[axes + k], x[2 * axes + k], u[k]
-        at_0, at_1 = tangent_of(sizes, group, rows, i, 0, k), tangent_of(sizes, group, rows, i, 1, k)
-        at_2 = tangent_of(sizes, group, rows, i, 2, k)
-        long_0, long_1, long_2 = long_0 + at_0 * at_0, long_1 + at_1 * at_1, long_2 + at_2 * at_2
-        (v_1, v_2, v_3), (_, e_1, e_2, e_3) = of_axis(h, v, a, j)
-        e_c1, e_c2 = THIRD * v, THIRD * (2.0 * v + h * a)
+        (v_1, v_2, v_3), (_, e_1, e_2, e_3) = of_axis(h, x[axes + k], x[2 * axes + k], u[k])
         y_1, y_2, y_3 = y_1 + v_1 * e_1, y_2 + v_2 * e_2, y_3 + v_3 * e_3
-        n_1, n_2 = n_1 + rows.n[i, 1, k] * e_c1, n_2 + rows.n[i, 2, k] * e_c2
-        t_1, t_2 = t_1 + at_1 * e_c1, t_2 + at_2 * e_c2
-    one = 1.0 + 0.0 * h
-    slide_0 = flat_p * rows.moves[i, 0] / where(long_0 > 0.0, long_0, one)
-    slide_1 = flat_c1 * rows.moves[i, 1] / where(long_1 > 0.0, long_1, one)
-    slide_2 = flat_c2 * rows.moves[i, 2] / where(long_2 > 0.0, long_2, one)
     total = (z[more + H_MAX] * per_s[more + H_MAX] + z[more + H_MIN] * per_s[more + H_MIN]) * (
         group.per_h[i] * group.per_h[i]
     )
     for k in range(axes):
         v, a, j = x[axes + k], x[2 * axes + k], u[k]
         (v_1, v_2, v_3), (e_mid, e_1, e_2, e_3) = of_axis(h, v, a, j)
-        n_0, n_c1, n_c2 = rows.n[i, 0, k], rows.n[i, 1, k], rows.n[i, 2, k]
-        at_0, at_1 = tangent_of(sizes, group, rows, i, 0, k), tangent_of(sizes, group, rows, i, 1, k)
-        at_2 = tangent_of(sizes, group, rows, i, 2, k)
         box_j, box_a = _box(sizes, group, rows, i, 0, k), _box(sizes, group, rows, i, 1, k)
         box_mid, box_v = _box(sizes, group, rows, i, 2, k), _box(sizes, group, rows, i, 3, k)
         for t in range(k + 1):
             (w_1, w_2, w_3), _ = of_axis(h, x[axes + t], x[2 * axes + t], u[t])
             g_v = s_v * v * x[axes + t]
             g_1, g_2, g_3 = s_1 * v_1 * w_1, s_2 * v_2 * w_2, s_3 * v_3 * w_3
-            g_p = s_p * n_0 * rows.n[i, 0, t] - slide_0 * at_0 * tangent_of(sizes, group, rows, i, 0, t)
-            g_c1 = s_c1 * n_c1 * rows.n[i, 1, t] - slide_1 * at_1 * tangent_of(sizes, group, rows, i, 1, t)
-            g_c2 = s_c2 * n_c2 * rows.n[i, 2, t] - slide_2 * at_2 * tangent_of(sizes, group, rows, i, 2, t)
             if t == k:
                 g_v, g_1, g_2, g_3 = g_v + flat_v + box_v, g_1 + flat_1, g_2 + flat_2, g_3 + flat_3
-                g_p, g_c1, g_c2 = g_p + flat_p, g_c1 + flat_c1, g_c2 + flat_c2
-            pp, vp, ap = g_p + g_c1 + g_c2, third * (g_c1 + 2.0 * g_c2), sixth * g_c2
-            vv = g_v + g_1 + g_2 + g_3 + third * third * (g_c1 + 4.0 * g_c2)
-            av = h * (0.25 * g_1 + 0.5 * g_2 + 0.75 * g_3) + 2.0 * third * sixth * g_c2
-            aa = square * (0.0625 * g_1 + 0.25 * g_2 + 0.5625 * g_3) + sixth * sixth * g_c2
+            vv = g_v + g_1 + g_2 + g_3
+            av = h * (0.25 * g_1 + 0.5 * g_2 + 0.75 * g_3)
+            aa = square * (0.0625 * g_1 + 0.25 * g_2 + 0.5625 * g_3)
             jv = square * (TWELFTH * g_2 + 0.25 * g_3)
             ja = square * h * (0.5 * TWELFTH * g_2 + 0.1875 * g_3)
             jj = square * square * (TWELFTH * TWELFTH * g_2 + 0.0625 * g_3)
             if t == k:
                 vv, av = vv + box_mid, av + 0.5 * h * box_mid
                 aa, jj = aa + box_a + 0.25 * square * box_mid, jj + box_j
+            b, d = (
+                _tube_block(sizes, group, rows, i, 0, of_0, h, k, t),
+                _tube_block(sizes, group, rows, i, 1, of_1, h, k, t),
+            )
+            pp, vp, ap, jp = b[0] + d[0], b[1] + d[1], b[2] + d[2], b[3] + d[3]
+            vv, av, jv = vv + b[4] + d[4], av + b[5] + d[5], jv + b[6] + d[6]
+            aa, ja, jj = aa + b[7] + d[7], ja + b[8] + d[8], jj + b[9] + d[9]
             for row_of, column in ((k, t), (t, k)):
                 W[axes + row_of, column], W[2 * axes + row_of, column] = vp, ap
-                W[3 * axes + row_of, column] = 0.0
+                W[3 * axes + row_of, column] = jp
                 W[2 * axes + row_of, axes + column], W[3 * axes + row_of, axes + column] = av, jv
                 W[3 * axes + row_of, 2 * axes + column] = ja
             W[k, t], W[axes + k, axes + t] = pp, vv
             W[2 * axes + k, 2 * axes + t], W[3 * axes + k, 3 * axes + t] = aa, jj
-        e_c1, e_c2 = THIRD * v, THIRD * (2.0 * v + h * a)
         f_mid, f_1 = box_mid * e_mid, s_1 * y_1 * v_1 + flat_1 * e_1
         f_2, f_3 = s_2 * y_2 * v_2 + flat_2 * e_2, s_3 * y_3 * v_3 + flat_3 * e_3
-        f_c1 = s_c1 * n_1 * n_c1 - slide_1 * t_1 * at_1 + flat_c1 * e_c1
-        f_c2 = s_c2 * n_2 * n_c2 - slide_2 * t_2 * at_2 + flat_c2 * e_c2
-        total += e_mid * f_mid + e_1 * f_1 + e_2 * f_2 + e_3 * f_3 + e_c1 * f_c1 + e_c2 * f_c2
-        W[at, k], W[at, axes + k], W[at, 2 * axes + k], W[at, 3 * axes + k] = spread(
-            h, f_mid, f_1, f_2, f_3, f_c1, f_c2
-        )
+        by_v, by_a, by_j = spread(h, f_mid, f_1, f_2, f_3)
+        b, of_b = _tube_by_h(sizes, group, rows, i, 0, of_0, x, u, k)
+        d, of_d = _tube_by_h(sizes, group, rows, i, 1, of_1, x, u, k)
+        total += e_mid * f_mid + e_1 * f_1 + e_2 * f_2 + e_3 * f_3 + of_b + of_d
+        W[at, k], W[at, axes + k] = b[0] + d[0], by_v + b[1] + d[1]
+        W[at, 2 * axes + k], W[at, 3 * axes + k] = by_a + b[2] + d[2], by_j + b[3] + d[3]
     W[at, at] = total
     if sizes.any_normal:
         _add_across(sizes, group, rows, i, x, W)
     if bent:
-        for which in range(1, 6):
-            _put_bent_row(sizes, group, rows, i, which, x, u, row)
-            of = more + (0, TUBE_NODE + 1, TUBE_NODE + 2, ORDER_NODE, ORDER_MID, ARC)[which]
+        for m in range(SETS):
+            for which in range(1, 3):
+                _put_bent_row(sizes, group, rows, i, which, m, x, u, row)
+                of = more + TUBE_NODE + 3 * m + which
+                _add_square(sizes, W, row, group.bent[i] * z[of] * per_s[of])
+        for which in range(3, 6):
+            _put_bent_row(sizes, group, rows, i, which, 0, x, u, row)
+            of = more + (ORDER_NODE, ORDER_MID, ARC)[which - 3]
             _add_square(sizes, W, row, group.bent[i] * z[of] * per_s[of])
     if sizes.any_switch:
         _put_switch_row(sizes, group, i, x, row)

@@ -12,7 +12,7 @@ from planner.base.views import size
 from planner.joint.laws import LawRows
 from planner.joint.legs import LegFormulas
 from planner.joint.problem import StepWindow
-from planner.joint.row_kinds import NORMAL_NODE, NORMAL_ROWS, SWITCH, TUBE_NODE
+from planner.joint.row_kinds import NORMAL_NODE, NORMAL_ROWS, SETS, SWITCH, TUBE_NODE
 
 # Numbers of axes that there are kernels for; windows of other numbers have axes beside that do not move, and those of more
 # a kernel of their own: it takes a minute to compile one.
@@ -55,6 +55,7 @@ class Group(NamedTuple):
     per_box: FloatArray  # (4, A, W) 1/limit of jerk, acceleration, velocity, velocity
     room: FloatArray  # (N, W)
     room_node: FloatArray  # (N, W)
+    sag: FloatArray  # (2, W)
     feed: FloatArray  # (N, W) the square of the limit
     feed_node: FloatArray  # (N, W)
     normal: FloatArray  # (N, W) the limit
@@ -91,7 +92,7 @@ class Bends(NamedTuple):
 def group_of(
     windows: list[StepWindow], width: int
 ) -> tuple[Sizes, Group, Bends, FloatArray, FloatArray, FloatArray]:
-    """Up to `width` windows of the same number of axes, and x (N+1, S, W), u (N, C, W), place (N, 3, W) of them."""
+    """Up to `width` windows of the same number of axes, and x (N+1, S, W), u (N, C, W), place (N, 6, W) of them."""
     of = windows[0].u.shape[1] - 1
     axes = next((many for many in AXES if many >= of), of)
     counts = [len(one.u) for one in windows]
@@ -140,6 +141,7 @@ def group_of(
         per_box=points([1.0 / one.limits.box for one in windows], 1.0, 4),
         room=1.0 / limit("room", 1.0) ** 2,
         room_node=1.0 / limit("room_node", 1.0) ** 2,
+        sag=stack([one.limits.sag for one in windows], 0.0, SETS),
         feed=limit("feed", 1.0) ** 2,
         feed_node=1.0 / limit("feed_node", 1.0) ** 2,
         normal=limit("normal", 1.0),

@@ -1,7 +1,8 @@
 """Where the search begins: the motion of another method, cut into steps.
 
 A corner is shaped by jerk, within the time in which full jerk moves an axis by the tolerance, (eps/j)^(1/3),
-or takes it to its full acceleration, a/j. The shorter of them is the unit: where the jerk is at its limit it
+or takes it to its full acceleration, a/j. The shorter of them is the unit, or `PERIODS` if that is longer, as
+setpoints do not tell of what is shorter: where the jerk is at its limit it
 has `Cut.per_unit` steps, and all of a leg at least `Cut.of_leg` and one in `LONGEST` units. So phases of full
 jerk get short steps and cruises a few long ones.
 
@@ -26,6 +27,8 @@ from planner.motion.trajectory import Trajectory
 # Longer steps make the rows stiff: a change of jerk moves their end by h^3/6. But a leg has no more than so
 # many because of it.
 LONGEST, MOST_FOR_LENGTH = 4.0, 60
+# Interpolation periods in a unit at least [-]: with less, chords reach over more steps, and much is searched again.
+PERIODS = 1.0
 # Steps on arcs are at most this fraction of what the problem allows them (run.py) [-], which leaves room to
 # move.
 ARC_STEP = 0.8
@@ -103,7 +106,8 @@ def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: C
 def unit_of(run: TubeRun) -> float:
     """The unit of time in which a corner is shaped (module text) [s]."""
     jerk = run.jerk_scale
-    return float(min((run.acceleration / jerk).min(), np.cbrt(run.scale.min() / jerk.max())))
+    shaped = float(min((run.acceleration / jerk).min(), np.cbrt(run.budget.min() / jerk.max())))
+    return max(shaped, PERIODS * 2.0 * run.chord)
 
 
 def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:

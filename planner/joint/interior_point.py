@@ -28,9 +28,9 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import anywhere, larger, magnitude, pick, put, root, smaller, where
 from planner.base.views import vector, wide1, wide2, wide3
-from planner.joint.memory import THREE, lanes_of, room_of, rows_in, scratch_of
+from planner.joint.memory import PLACES, THREE, lanes_of, room_of, rows_in, scratch_of
 from planner.joint.recursion import END, Factor, backward, factor_steps, forward, gaps
-from planner.joint.row_kinds import TUBE_NODE
+from planner.joint.row_kinds import SETS, TUBE_NODE
 from planner.joint.rows import put_rows
 
 # Growth of prox per iteration once it grows, and its largest value [-]: slower growth takes more iterations. At
@@ -136,7 +136,7 @@ def _end(sizes, lane, done, iteration, group, rows, x, u, found):
     for i in range(N):
         for c in range(len(sizes.control)):
             found.u[i, c] = put(found.u[i, c], lane, pick(u[i, c], lane))
-        for c in range(3):
+        for c in range(3 * SETS):
             found.place[i, c] = put(found.place[i, c], lane, pick(rows.place[i, c], lane))
         for r in range(R):
             z = pick(rows.z[i, r], lane)
@@ -157,18 +157,18 @@ def _go(sizes, x, u, factor, along):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
 def solve_group(sizes, numbers, bends, motion, tuning, work, found):
-    """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 3, W),
+    """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 6, W),
     which is overwritten; tuning (7, W). What each comes to is set in `found`."""
     width, group = sizes.width, lanes_of(sizes, numbers)
     R, S = sizes.rows, len(sizes.state)
     x, u = wide2(motion[0], width, sizes.state), wide2(motion[1], width, sizes.control)
-    rows = rows_in(sizes, work, wide2(motion[2], width, THREE))
+    rows = rows_in(sizes, work, wide2(motion[2], width, PLACES))
     tuned = wide1(tuning, width)
     tune = Tuning(tuned[0], tuned[1], tuned[2], tuned[3], tuned[4], tuned[5], tuned[6])
     ends = Found(
         wide2(found.x, width, sizes.state),
         wide2(found.u, width, sizes.control),
-        wide2(found.place, width, THREE),
+        wide2(found.place, width, PLACES),
         wide2(found.z, width, R),
         found.done,
         found.iterations,

@@ -7,20 +7,21 @@ from planner.base.lanes import pick, put
 from planner.joint.laws import put_law_rows
 from planner.joint.legs import Foot, Slopes, nearest_point, off_tangent
 from planner.joint.normal_rows import BETWEEN
-from planner.joint.row_kinds import C1, C2, LAW_ROWS, NEXT, TUBE_NODE, P
+from planner.joint.row_kinds import LAW_ROWS, OF_SET, SETS, TUBE, TUBE_NODE
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_passed(axes, bends, i, lane, group, y, rows):
     """The rows of the tolerance of a step on a leg that is passed: its places are fixed."""
-    for c in range(3):
-        per = pick(group.room_node[i] if c == 0 else group.room[i], lane)
+    for c in range(3 * SETS):
+        of_node, vector = c % 3 == 0, TUBE + OF_SET * (c // 3) + c % 3
+        per = pick(group.room_node[i] if of_node else group.room[i], lane)
         square = 0.0
         for k in range(bends.target.shape[2]):
-            target = bends.target[i, c, k, lane]
-            if c == 0 and pick(group.at_vertex[i], lane) > 0.0:
+            target = bends.target[i, c % 3, k, lane]
+            if of_node and pick(group.at_vertex[i], lane) > 0.0:
                 target = pick(group.start[i, k], lane)
-            off = pick(y[(P, C1, C2)[c], k], lane) - target
+            off = pick(y[vector, k], lane) - target
             square += off * off
             rows.n[i, c, k] = put(rows.n[i, c, k], lane, off * per)
         row = 8 * axes + TUBE_NODE + c
@@ -31,6 +32,14 @@ def put_passed(axes, bends, i, lane, group, y, rows):
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def put_bent(axes, bends, i, lane, group, y, rows, scratch):
     """The rows of the tolerance of a step on an arc or a curve."""
+    for m in range(SETS):
+        _put_bent(axes, bends, i, lane, group, m, y, rows, scratch)
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _put_bent(axes, bends, i, lane, group, m, y, rows, scratch):
+    """Those of a set."""
+    at = TUBE + OF_SET * m
     legs, r, length = bends.legs, bends.leg[i, lane], bends.legs.length[bends.leg[i, lane]]
     at_vertex = pick(group.at_vertex[i], lane) > 0.0
     ends = pick(group.ends[i], lane) > 0.0 and pick(group.last[i], lane) == 0.0
@@ -38,14 +47,14 @@ def put_bent(axes, bends, i, lane, group, y, rows, scratch):
     slopes = Slopes(scratch.n, scratch.node, scratch.tangent)
     for k in range(of):
         c_of[0, k], c_of[1, k], c_of[2, k] = (
-            pick(y[P, k], lane),
-            pick(y[C1, k], lane),
-            pick(y[C2, k], lane),
+            pick(y[at, k], lane),
+            pick(y[at + 1, k], lane),
+            pick(y[at + 2, k], lane),
         )
-        scratch.x[k] = pick(y[NEXT, k], lane)
+        scratch.x[k] = pick(y[at + 3, k], lane)
     for c in range(3):
         room = 1.0 / np.sqrt(pick(group.room_node[i] if c == 0 else group.room[i], lane))
-        place = pick(rows.place[i, c], lane)
+        place, column = pick(rows.place[i, 3 * m + c], lane), 3 * m + c
         scratch.node[:] = 0.0
         if c == 0:
             place, value = nearest_point(legs, r, c_of[0], place, point, scratch.tangent), 0.0
@@ -58,7 +67,7 @@ def put_bent(axes, bends, i, lane, group, y, rows, scratch):
             value = 0.5 * (value / (room * room) - 1.0)
         else:
             if c == 1:
-                place = 0.0 if at_vertex else pick(rows.place[i, 0], lane)
+                place = 0.0 if at_vertex else pick(rows.place[i, 3 * m], lane)
             elif ends:
                 place = length
             else:
@@ -67,14 +76,14 @@ def put_bent(axes, bends, i, lane, group, y, rows, scratch):
             other = c_of[0] if c == 1 else scratch.x[:of]
             value, place = off_tangent(legs, r, c_of[c], other, Foot(place, fixed, c == 1), room, slopes)
         for k in range(of):
-            rows.n[i, c, k] = put(rows.n[i, c, k], lane, scratch.n[k])
-            rows.node[i, c, k] = put(rows.node[i, c, k], lane, scratch.node[k])
-            rows.tangent[i, c, k] = put(rows.tangent[i, c, k], lane, scratch.tangent[k])
-        rows.place[i, c] = put(rows.place[i, c], lane, place)
-        row = 8 * axes + TUBE_NODE + c
+            rows.n[i, column, k] = put(rows.n[i, column, k], lane, scratch.n[k])
+            rows.node[i, column, k] = put(rows.node[i, column, k], lane, scratch.node[k])
+            rows.tangent[i, column, k] = put(rows.tangent[i, column, k], lane, scratch.tangent[k])
+        rows.place[i, column] = put(rows.place[i, column], lane, place)
+        row = 8 * axes + TUBE_NODE + column
         rows.g[i, row] = put(rows.g[i, row], lane, value)
         stays = (c == 0 and at_vertex) or place <= 0.0 or place >= length
-        rows.moves[i, c] = put(rows.moves[i, c], lane, 0.0 if stays else 1.0)
+        rows.moves[i, column] = put(rows.moves[i, column], lane, 0.0 if stays else 1.0)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)

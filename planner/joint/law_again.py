@@ -1,4 +1,4 @@
-"""A window that is searched once more, as what was found exceeds laws (own_laws.py)."""
+"""A window that is searched once more, as what was found exceeds laws (own_laws.py) or the tolerance."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from planner.joint.own_laws import Where
 from planner.joint.run import TubeRun
 from planner.machine.user_limit import QUANTITIES
 
-# Where a run has laws, so often. A share above 1 by more than this comes of places that the motion slid to [-].
+# So often at most. A share above 1 by more than this comes of places that the motion slid to [-].
 TOLD, SLID = 6, 0.01
 PULL_AGAIN = 0.1  # so that what is searched once more hardly slides along itself [-]
 # Power of a share by which a law is lowered, by this at least [-] (what slides on is above it by some 1e-6
@@ -16,12 +16,6 @@ PULL_AGAIN = 0.1  # so that what is searched once more hardly slides along itsel
 TIGHTER_BESIDE, LOWERED, BESIDE, EVERYWHERE = 1.5, 1e-5, 3, 2
 LOWERED_MOST = 0.2  # as what is far above its limit comes of a place where the motion hardly moves [-]
 JERK = QUANTITIES.index("jerk")
-
-
-def lost(over: FloatArray) -> bool:
-    """Whether more tries do not help, by the shares `over` (N, 1 + M): of the tolerance along curves, and of laws that
-    are far off."""
-    return bool((over[:, 0] > 1.0).any() or (over[:, 1:] > 1.0 + SLID).any())
 
 
 def tightened(over: FloatArray, number: int) -> FloatArray:

@@ -9,9 +9,9 @@ from planner.base.kernels import CONTRACT, njit
 from planner.base.views import matrix, size, vector, wide1, wide2, wide3
 from planner.joint.group import Bends, Group, Sizes
 from planner.joint.recursion import Room
-from planner.joint.row_kinds import NORMAL_ROWS, VECTORS, Rows, Scratch
+from planner.joint.row_kinds import NORMAL_ROWS, SETS, VECTORS, Rows, Scratch
 
-_ALL, THREE = size(VECTORS), size(3)
+_ALL, THREE, PLACES = size(VECTORS), size(3), size(3 * SETS)
 
 
 class Work(NamedTuple):
@@ -47,7 +47,8 @@ def work_of(sizes: Sizes, bends: Bends) -> Work:
     N, R, W = sizes.steps, sizes.rows, len(sizes.width)
     A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
     bent, own = N if sizes.any_bent else 0, N if sizes.any_own else 0
-    shapes = [(N, R)] * 7 + [(N, 3), (N, 3), (N, 3, A), (bent, 3, A), (bent, 3, A)]
+    P = 3 * SETS
+    shapes = [(N, R)] * 7 + [(N, P), (N, 3), (N, P, A), (bent, P, A), (bent, P, A)]
     shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (2,), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
     shapes += [(N, S), (R,), (N, 3), (N,)]
     return Work(*(np.zeros((*shape, W)) for shape in shapes))
@@ -74,6 +75,7 @@ def lanes_of(sizes, group):
         wide2(group.per_box, width, sizes.axes),
         wide1(group.room, width),
         wide1(group.room_node, width),
+        wide1(group.sag, width),
         wide1(group.feed, width),
         wide1(group.feed_node, width),
         wide1(group.normal, width),
@@ -108,11 +110,11 @@ def rows_in(sizes, work, place):
         wide2(work.ds, w, sizes.rows),
         wide2(work.dz, w, sizes.rows),
         place,
-        wide2(work.moves, w, THREE),
+        wide2(work.moves, w, PLACES),
         wide2(work.per_radius, w, THREE),
-        wide3(work.n, w, THREE, axes),
-        wide3(work.node, w, THREE, axes),
-        wide3(work.tangent, w, THREE, axes),
+        wide3(work.n, w, PLACES, axes),
+        wide3(work.node, w, PLACES, axes),
+        wide3(work.tangent, w, PLACES, axes),
         wide3(work.own, w, own, sizes.step),
         wide1(work.between, w),
     )

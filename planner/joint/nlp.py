@@ -186,9 +186,15 @@ class TubeNLP:
         ordinate = v + a * h / 2
         vertex, switch = ca.SX.sym("vertex", axes), ca.SX.sym("switch")
         rows: list[tuple[Any, float, float]] = [
-            (apart(p + h * v / 3, s0, s1 - s0) / room**2, -np.inf, 1.0),
-            (apart(p1 - h * v1 / 3, s3, s2 - s3) / room**2, -np.inf, 1.0),
-            (apart(p1, s3) / room_end**2, -np.inf, 1.0),
+            row
+            for sag in (0.0, run.sag / second**2)  # of setpoints, and of chords: they share their places
+            for row in (
+                (apart(p + sag * a + h * (v + sag * j) / 3, s0, s1 - s0) / room**2, -np.inf, 1.0),
+                (apart(p1 + sag * a1 - h * (v1 + sag * j) / 3, s3, s2 - s3) / room**2, -np.inf, 1.0),
+                (apart(p1 + sag * a1, s3) / room_end**2, -np.inf, 1.0),
+            )
+        ]
+        rows += [
             (ca.vertcat(s1 - s0, s2 - s1, s3 - s2) / own_mean, 0.0, np.inf),
         ]
         if (run.feed > run.velocity.min()).any():

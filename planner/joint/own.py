@@ -25,7 +25,7 @@ from planner.joint.checks import Keeps, worst_shares
 from planner.joint.groups import Search, Sweep, Task, searched
 from planner.joint.guess import CutMotion, Guess, unit_of
 from planner.joint.interior_point import Tuning
-from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, lost, strain, tightened
+from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, strain, tightened
 from planner.joint.law_window import NEAR, Window, near
 from planner.joint.legs import LegFormulas
 from planner.joint.motion import Steps, closed_at_nodes
@@ -54,9 +54,10 @@ JOIN_WITHIN = SIZES.searched_join
 PROX, MISSED = 0.1, 1e-6
 # Complementarity of the start, share of the time, and its slacks at least [-].
 START = (0.3, 0.05)
-# Laws of the position are about a place, and of the tolerance along a curve the rows know the tangents at nodes.
-# Where one is exceeded it is lowered by what it was above, and a little more [-], at most so many times.
-TIGHTENED, TIGHTER = 3, 1.002
+# Laws of the position are about a place, of the tolerance along a curve the rows know the tangents at nodes, and of chords
+# the acceleration there. Where one is exceeded it is lowered by what it was above, and a little more [-]; the tolerance by
+# that power of it, as chords that are longer than steps then have more acceleration elsewhere.
+TIGHTER, MORE = 1.002, 2.0
 # Where steps want to be shorter than they may become (problem.py) a window is searched once more from what was found,
 # if that is worth this share of the time [-]
 # (`python -m benchmarks.net.ablation ROWS --net NET --without SHORTENED`).
@@ -240,14 +241,14 @@ class _Search:
         tuning = Tuning(PULL, PROX, self.settings.gap, MISSED, self.settings.least, *START)
         tight, begun = np.ones((hi - lo, 1 + len(run.laws))), Window(self.guess, lo, hi)
         needed, beside, taken = near(run.laws, begun), no_rows_beside(hi - lo, len(run.axis)), False
-        for number in range(TOLD if len(run.laws) or run.switch.any() else TIGHTENED):
+        for number in range(TOLD):
             which = np.flatnonzero(needed)
             window = window_of(run, begun, begun.lo, begun.hi, MISSED, tight, smooth, which, beside)
             done, iterations, z = yield Asked(window, tuning)
             self.iterations.append(iterations)
             if not done:
                 break
-            over = self._taken(lo, hi, window, begun, beside)
+            over = self._taken(lo, hi, window, begun, beside, last=number == TOLD - 1)
             if over is None:
                 self.price[lo:hi] = step_prices(run, window, z)
                 taken, begun = True, Window(self.guess, lo, hi)
@@ -257,33 +258,36 @@ class _Search:
                 continue
             if not over.any():
                 continue
-            if not (over > 1.0).any() or (number >= TIGHTENED - 1 and lost(over)):
+            if not (over > 1.0).any():
                 break
             tuning = tuning._replace(pull=PULL_AGAIN if run.laws.moved else PULL)
             of_laws = over[:, 1:]
             # rows that are far off are asked for about other places first
             near_enough = (of_laws.max(axis=0, initial=0.0) < 1.0 + SLID) | (number > 0)
-            tight[:, 0] *= np.where(over[:, 0] > 1.0, over[:, 0] * TIGHTER, 1.0)
+            tight[:, 0] *= np.where(over[:, 0] > 1.0, over[:, 0] ** MORE * TIGHTER, 1.0)
             tight[:, 1:] *= np.where(near_enough, tightened(of_laws, number), 1.0)
             needed |= (of_laws > NEAR).any(axis=0)
         return taken
 
     def _taken(
-        self, lo: int, hi: int, window: StepWindow, begun: Window, beside: Beside
+        self, lo: int, hi: int, window: StepWindow, begun: Window, beside: Beside, *, last: bool
     ) -> FloatArray | None:
         """None where the steps lo .. hi - 1 of a window that has been solved keep everything; if they are
         faster they take their place. Else the shares (hi - lo, 1 + M) that they use of what rows watch in places, or
         about other places, only: the tolerance along curves, the laws; then `begun` becomes what was found. In `beside`
-        comes where rows of a change of feed are missing; the shares are 0 then."""
+        comes where rows of a change of feed are missing; the shares are 0 then. Of chords the verdict is the `last` to tell:
+        the motion may pass slower in places."""
         run, axes, guess = self.run, len(self.run.axis), self.guess
         h = window.u[:, axes] * window.second
         state, leg = guess.state[lo : hi + 1], guess.leg[lo:hi]
         nodes = window.nodes()
         nodes[[0, -1]] = state[[0, -1]]
         found, jerk = closed_at_nodes(nodes, h, window.u[:, :axes] * (window.length / window.second**3))
-        place = window.place * window.length
+        place = window.place[:, :3] * window.length
         along = place + run.offset[leg][:, None]
-        limit, tube = worst_shares(self._keeps, leg, h, found, jerk, place)
+        limit, (tube, chords) = worst_shares(self._keeps, leg, h, found, jerk, place)
+        if not last:
+            tube = np.maximum(tube, chords)
         ends = np.append(along[:, 0], guess.place[hi - 1, 3])
         of_laws = watched(run.laws, leg, h, found, jerk, ends)
         inside = limit <= 1.0 + ROUNDING and of_laws.max(initial=0.0) <= 1.0 + ROUNDING
@@ -293,7 +297,7 @@ class _Search:
             # what passes a short leg at its distance is nearest to one of its ends, and too far in its middle:
             # no step of such a leg alone is the cause
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
-            np.maximum.at(of_leg, leg, np.where(run.radius[leg] > 0.0, tube, 0.0))
+            np.maximum.at(of_leg, leg, np.where((run.radius[leg] > 0.0) | (tube > 1.0), tube, 0.0))
             return np.column_stack([of_leg[leg], of_laws])
         missed = self._switches_missed(lo, hi, h, found, jerk)
         if missed is not None:
@@ -325,4 +329,4 @@ def keeps_of(run: TubeRun) -> Keeps:
     same = ("velocity", "acceleration", "jerk", "feed", "budget", "curvature", "vertex_budget", "passed")
     of_legs, of_run = ({name: getattr(run, name) for name in names} for names in (formula, same))
     legs = LegFormulas(**of_legs, points=run.curves.points, weight=run.curves.weight)
-    return Keeps(legs=legs, normal=run.across_max, **of_run)
+    return Keeps(legs=legs, normal=run.across_max, lag=run.lag, chord=run.chord, **of_run)

@@ -32,7 +32,7 @@ class StepWindow(NamedTuple):
     limits: StepLimits
     x: FloatArray  # (N+1, S) position from the first node, velocity, acceleration of the nodes; the first and the last one stay
     u: FloatArray  # (N, C) jerk and duration
-    place: FloatArray  # (N, 3) of the node and the inner control points along the leg
+    place: FloatArray  # (N, 6) of the node and the inner control points along the leg, of both sets
     second: float  # unit of time [s]
     length: float  # unit of length [mm]
     origin: FloatArray  # (A,) [mm]
@@ -81,7 +81,7 @@ def window_of(
         [(state[:, 0] - units.origin) / length, state[:, 1] / speed, state[:, 2] / acc], axis=1
     )
     jerks = np.diff(state[:, 2], axis=0) / h[:, None]
-    place = (cut.place[part, :3] - run.offset[leg][:, None]) / length
+    place = np.tile((cut.place[part, :3] - run.offset[leg][:, None]) / length, rows.SETS)
     beside = no_rows_beside(len(leg), len(run.axis)) if beside is None else beside
     limits = _limits(run, cut, units, (missed, tight), laws, smooth, beside)
     return StepWindow(
@@ -186,6 +186,7 @@ def _limits(
         box=axes * inside,
         room=room / length,
         room_node=room_node / length,
+        sag=np.array([0.0, run.sag / second**2]),
         feed=feed * inside / speed,
         feed_node=np.minimum(feed, np.append(feed[0], feed[:-1])) * inside / speed,
         normal=normal * inside / acc,
@@ -237,5 +238,6 @@ def _present(run: TubeRun, leg: Array, at_vertex: Array) -> Array:
     more[~limited, rows.NORMAL_ROWS : rows.LAW_ROWS] = False
     more[run.curvature[leg] == 0, rows.ARC] = False
     on[0, 2 * axes : 4 * axes] = on[0, 6 * axes : 8 * axes] = False
-    more[0, [rows.FEED_NODE, rows.TUBE_NODE, rows.ORDER_NODE, rows.NORMAL_NODE]] = False
+    at_node = rows.FEED_NODE, rows.TUBE_NODE, rows.TUBE_NODE + 3, rows.ORDER_NODE, rows.NORMAL_NODE
+    more[0, at_node] = False
     return on

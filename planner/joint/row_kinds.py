@@ -7,14 +7,23 @@ from planner.joint.laws import LawRows
 from planner.joint.normal_rows import BETWEEN
 
 # Vectors y, in this order.
-P, V, A, J, MID, FEED_1, FEED_2, FEED_3, C1, C2, ACROSS, LONG, NEXT = range(13)
-VECTORS = 13
+P, V, A, J, MID, FEED_1, FEED_2, FEED_3, ACROSS, LONG, TUBE = range(11)
+# From `TUBE` on those of the tolerance, of `SETS`: of the setpoints, and of the chords between them. Each has the node,
+# two inner control points, and the next node.
+SETS, OF_SET = 2, 4
+VECTORS = TUBE + SETS * OF_SET
 # Rows behind those of the axes (jerk, acceleration, velocity in the middle and at the node, upper before
 # lower), in this order.
-H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = 0, 1, 2, 3, 6  # three of the feed, three of the tolerance
-ORDER_NODE, ORDER_MID, NORMAL_NODE, ARC, SWITCH, SIDE = range(9, 15)
+H_MAX, H_MIN, FEED_NODE, FEED_ROWS, TUBE_NODE = (
+    0,
+    1,
+    2,
+    3,
+    6,
+)  # three of the feed, three of the tolerance for each set
+ORDER_NODE, ORDER_MID, NORMAL_NODE, ARC, SWITCH, SIDE = range(12, 18)
 # Rows with derivatives of their own: of the normal acceleration between nodes, and the laws.
-NORMAL_ROWS, LAW_ROWS = 15, 15 + BETWEEN
+NORMAL_ROWS, LAW_ROWS = 18, 18 + BETWEEN
 MORE_ROWS = LAW_ROWS
 VECTOR_OF_BOX = (J, A, MID, V)
 THIRD, SIXTH, TWELFTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0
@@ -36,6 +45,7 @@ class StepLimits(NamedTuple):
     box: FloatArray  # (4, A) jerk, acceleration, velocity, velocity
     room: FloatArray  # (N,) of inner control points
     room_node: FloatArray  # (N,) of the node
+    sag: FloatArray  # (2,) of each set, in time^2: 0 of setpoints, `TubeRun.sag` of chords
     feed: FloatArray  # (N,)
     feed_node: FloatArray  # (N,)
     normal: FloatArray  # (N,)
@@ -65,12 +75,12 @@ class Rows(NamedTuple):
     q: FloatArray  # (N, R) z (g + s)/s
     ds: FloatArray  # (N, R) after the predictor ds dz
     dz: FloatArray  # (N, R)
-    place: FloatArray  # (N, 3) of the node and the inner control points along the leg
-    moves: FloatArray  # (N, 3) 1 where these move with the point
+    place: FloatArray  # (N, 6) of the node and the inner control points along the leg, for one set after the other
+    moves: FloatArray  # (N, 6) 1 where these move with the point
     per_radius: FloatArray  # (N, 3) 1/r^2 of the rows of the feed
-    n: FloatArray  # (N, 3, A) derivatives of the rows of the tolerance by y
-    node: FloatArray  # (N or 0, 3, A) on arcs by the second vectors
-    tangent: FloatArray  # (N or 0, 3, A) of the leg, on arcs
+    n: FloatArray  # (N, 6, A) derivatives of the rows of the tolerance by y
+    node: FloatArray  # (N or 0, 6, A) on arcs by the second vectors
+    tangent: FloatArray  # (N or 0, 6, A) of the leg, on arcs
     own: FloatArray  # (N or 0, .., 4 A + 1) derivatives of the rows from `NORMAL_ROWS` on
     between: FloatArray  # (2,) for the rows of the normal acceleration of a step
 

@@ -14,7 +14,7 @@ so that all rows of one y add up to one small matrix G = sum of z d2g/dy2 + (z/s
     v + a h/2        Bezier ordinate           limits of the axes; order, on arcs: not backwards along the leg
     v + a h/4, v + a h/2 + j h2/12,            feed
     v + 3 a h/4 + j h2/4
-    p + h v/3, p + 2 h v/3 + h2 a/6            the tolerance: inner control points of the cubic
+    p + h v/3, p + 2 h v/3 + h2 a/6            the tolerance: inner control points of the cubic, of two of them (below)
     a - u v                                    normal acceleration, u = v.a/v.v kept: the smallest |a - u v| is what it is about
     h (v + a h/2)                              largest length of a step on an arc
     p, v             at a vertex               the feed of each leg as far as the motion is nearest to the vertex
@@ -24,6 +24,11 @@ The square of the feed has degree 4. With the Bezier ordinates w0, w1, w2 of the
 w0.w1, (2 w1.w1 + w0.w2)/3, w1.w2 and w2.w2; none above the square of the limit F is enough for the whole
 step, and on a circle at constant feed all are equal. w0.w1 = |y|^2 - |a h/4|^2 with y = v + a h/4, so that
 the row is |y| <= r, r^2 = F^2 + |a h/4|^2 kept, and the other two likewise.
+
+Between two setpoints the motion is their chord, in the middle of a period (p(t-) + p(t+))/2 = p + dt2/8 a of a cubic, and
+behind filters with the time constants T it is p + sum T2/24 a. So there are two sets of rows of the tolerance, of p + k a:
+of the setpoints, k = 0, and of the middles of chords behind filters, k = `TubeRun.sag`; all else lies between them. Each is
+a cubic with the state p + k a, v + k j, a. Of chords and filters longer than steps, what is found is looked at (checks.py).
 
 The tolerance is g = (d2/room2 - 1)/2 with the distance d to the nearest point of the leg (at a vertex: to the
 vertex), along which n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is
@@ -51,8 +56,6 @@ from planner.joint.places import put_places
 from planner.joint.row_kinds import (
     ACROSS,
     ARC,
-    C1,
-    C2,
     FEED_1,
     FEED_2,
     FEED_3,
@@ -62,15 +65,17 @@ from planner.joint.row_kinds import (
     H_MIN,
     LONG,
     MID,
-    NEXT,
     NORMAL_NODE,
     NORMAL_ROWS,
+    OF_SET,
     ORDER_MID,
     ORDER_NODE,
+    SETS,
     SIDE,
     SIXTH,
     SWITCH,
     THIRD,
+    TUBE,
     TUBE_NODE,
     TWELFTH,
     VECTOR_OF_BOX,
@@ -99,17 +104,20 @@ def turn_of(axes, x):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _put_vectors(axes, x, u, y):
-    """y (13, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
+def _put_vectors(axes, sag, x, u, y):
+    """y (18, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
     h, turn = u[axes], turn_of(axes, x)
     for k in range(axes):
         p, v, a, j = x[k], x[axes + k], x[2 * axes + k], u[k]
         y[P, k], y[V, k], y[A, k], y[J, k] = p, v, a, j
         y[MID, k] = v + 0.5 * h * a
         (y[FEED_1, k], y[FEED_2, k], y[FEED_3, k]), _ = of_axis(h, v, a, j)
-        y[C1, k], y[C2, k] = p + h * v * THIRD, p + h * THIRD * (2.0 * v + 0.5 * h * a)
         y[ACROSS, k], y[LONG, k] = a - turn * v, h * (v + 0.5 * h * a)
-        y[NEXT, k] = p + h * (v + h * (0.5 * a + h * j * SIXTH))
+        for m in range(SETS):
+            at, q, w = TUBE + OF_SET * m, p + sag[m] * a, v + sag[m] * j
+            y[at, k], y[at + 1, k] = q, q + h * w * THIRD
+            y[at + 2, k] = q + h * THIRD * (2.0 * w + 0.5 * h * a)
+            y[at + 3, k] = q + h * (w + h * (0.5 * a + h * j * SIXTH))
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -154,7 +162,7 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `rows`, whose places are where the search
     on arcs begins, and slacks and multipliers after the shares `along` and `dual` of their steps. Returns the sum of s z,
     the largest row, and the sum of z |g + s|: in units of time, what rows are off their slacks. A row that is not there is -1.
-    room: y (13, A), nearest (N, 3) and top (N,)."""
+    room: y (18, A), nearest (N, 3) and top (N,)."""
     axes, N, R = len(sizes.axes), sizes.steps, sizes.rows
     y, nearest, top = room
     more = 8 * axes
@@ -163,7 +171,7 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
     for i in range(N):
         g, h = rows.g[i], u[i, axes]
         bent = bent_at(sizes, group, i)
-        _put_vectors(axes, x[i], u[i], y)
+        _put_vectors(axes, group.sag, x[i], u[i], y)
         for m in range(4):
             for k in range(axes):
                 share = y[VECTOR_OF_BOX[m], k] * group.per_box[m, k]
@@ -174,14 +182,15 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
         _put_radii(axes, x[i], u[i], group.feed[i], rows.per_radius[i])
         for m in range(3):
             _ball(axes, y, FEED_1 + m, rows.per_radius[i, m], more + FEED_ROWS + m, g)
-        for c in range(3):
-            per = group.room_node[i] if c == 0 else group.room[i]
+        for c in range(3 * SETS):
+            of_node, vector = c % 3 == 0, TUBE + OF_SET * (c // 3) + c % 3
+            per = group.room_node[i] if of_node else group.room[i]
             square, place = 0.0 * h, rows.place[i, c]
             for k in range(axes):
                 point = group.base[i, k] + place * group.drift[i, k]
-                if c == 0:
+                if of_node:
                     point = where(group.at_vertex[i] > 0.0, group.start[i, k], point)
-                off = y[(P, C1, C2)[c], k] - point
+                off = y[vector, k] - point
                 square += off * off
                 if bent:
                     rows.n[i, c, k] = where(group.line[i] > 0.0, off * per, rows.n[i, c, k])

@@ -7,11 +7,9 @@ on it both are
     P(x) = base + drift x + radius (cos(rate x) e1 + sin(rate x) e2)
 
 with radius = 0 for a line, whose drift is its direction; or it is a segment of a curve of the program, P(x) of
-geometry/curves.py, with drift = 0 and the radius of a circle that bends as much. The motion may use eps_ap of every budget eps; what
-is left is for the chord error of the interpolation period and for the filters that follow (corners/budget.py,
-eq. (18)-(20)): at first with the largest normal acceleration that the axes can give in any direction, then
-with little more than what a motion was found to have on the leg, which becomes its limit there
-(`with_reserve`).
+geometry/curves.py, with drift = 0 and the radius of a circle that bends as much. Within the tolerance are to be the setpoints p
+and what becomes of them, p + sag a: filters move them by sum T^2/24 a, and the middle of a chord is dt^2/8 a off
+(corners/budget.py, eq. (18), as vectors).
 
 A step whose cubic has the places s0 <= s1 <= s2 <= s3 runs along P(x(t)), x = sum B_k s_k. The cubic that
 meets P(x(t)) at both ends with its velocity has the control points
@@ -34,10 +32,10 @@ from itertools import pairwise
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.corners.budget import chord_rate, filter_rate, largest_normal
 from planner.feedrate.constraints.limits import JERK, Limits
 from planner.geometry.curves import Curves
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.joint.budgets import HALF, budgets_of
 from planner.joint.laws import PUSH
 from planner.joint.leg_shapes import edges_of, shapes_of, word_change, word_shares, words_of
 from planner.joint.own_laws import RunLaws, laws_of
@@ -67,15 +65,16 @@ class TubeRun:
     curvature                    : (R,) bound of it on the leg [1/mm]
     curve                        : (R,) row in `curves`, or -1
     curves                       : over the A axes
-    budget, feed                 : (R,) eps_ap [mm], programmed feed [mm/s]
-    scale                        : (R,) the largest budget so far, by which steps are as long as they are [mm]
-    across_max                   : (R,) largest normal acceleration that the rest of the budget and the
-                                   machine allow [mm/s2]; inf where the axes cannot exceed it
+    budget, feed                 : (R,) tolerance [mm], programmed feed [mm/s]
+    across_max                   : (R,) largest normal acceleration that the machine allows [mm/s2]; inf where
+                                   the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
+    sag                          : how far the middles of chords between setpoints, behind filters, are from the motion per
+                                   acceleration [s2]
+    lag                          : (K, 2) times and weights of which filters behind the setpoints are the mean [s], [-]
+    chord                        : what is half a period to that [s]
     velocity, acceleration, jerk : (A,) limits of the axes; the jerk is inf where nothing limits it
     laws                         : other limits (own_laws.py)
-    reserved, share              : (R,) normal acceleration that the budgets leave room for [mm/s2], as far as
-                                   that takes no more than this share of the tolerance [-]
     word                         : (R, W) feed in the axes that F goes by [mm/s], W = 1 where others move with
                                    them, else 0
     counts                       : (A,) 1 for those axes, else 0
@@ -95,17 +94,17 @@ class TubeRun:
     curve: Array
     curves: Curves
     budget: FloatArray
-    scale: FloatArray
     feed: FloatArray
     across_max: FloatArray
     vertex: FloatArray
     vertex_budget: FloatArray
+    sag: float
+    lag: FloatArray
+    chord: float
     velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
     laws: RunLaws
-    reserved: FloatArray
-    share: FloatArray
     word: FloatArray
     counts: FloatArray
     left: str = ""
@@ -115,7 +114,7 @@ class TubeRun:
         freeze(self, "axis", np.int64, (axes,))
         freeze(self, "first", np.int64, (legs + 1,))
         freeze(self, "curve", np.int64, (legs,))
-        for name in ("length", "radius", "rate", "curvature", "budget", "scale", "reserved", "share"):
+        for name in ("length", "radius", "rate", "curvature", "budget"):
             freeze(self, name, np.float64, (legs,))
         for name in ("feed", "across_max"):
             freeze(self, name, np.float64, (legs,), finite=False)
@@ -123,6 +122,7 @@ class TubeRun:
             freeze(self, name, np.float64, (legs, axes))
         freeze(self, "vertex", np.float64, (legs + 1, axes))
         freeze(self, "vertex_budget", np.float64, (legs + 1,))
+        freeze(self, "lag", np.float64, (None, 2))
         for name in ("velocity", "acceleration", "counts"):
             freeze(self, name, np.float64, (axes,))
         freeze(self, "jerk", np.float64, (axes,), finite=False)
@@ -137,22 +137,22 @@ class TubeRun:
         time in which that moves it by the least budget [mm/s3]."""
         pushed = min((law.bound for law in self.laws.laws if law.kind == PUSH), default=np.inf)
         acceleration = np.minimum(self.acceleration, pushed)
-        shaped = SHARP * np.sqrt(self.scale.min() / acceleration.max())
+        shaped = SHARP * np.sqrt(self.budget.min() / acceleration.max())
         return np.where(np.isfinite(self.jerk), self.jerk, acceleration / shaped)
 
     @cached_property
     def step_max(self) -> FloatArray:
         """(R,) largest length on a leg that one step may cover [mm]: where an even step is off by
-        `ARC_FRACTION` of the scale (module text); inf on lines."""
+        `ARC_FRACTION` of the budget (module text); inf on lines."""
         with np.errstate(divide="ignore"):
-            fourth = 384.0 * ARC_FRACTION * self.scale / (self.curvature * self.rate**2)
+            fourth = 384.0 * ARC_FRACTION * self.budget / (self.curvature * self.rate**2)
             turning = np.where(self.curve < 0, np.abs(self.rate), self.curvature)
             return np.minimum(fourth**0.25, TURN_MAX / turning)
 
     @cached_property
     def room(self) -> FloatArray:
         """(R,) how far control points of a step may be from their places on the leg [mm]."""
-        return np.where(self.curvature > 0, self.budget - ARC_FRACTION * self.scale, self.budget)
+        return np.where(self.curvature > 0, self.budget - ARC_FRACTION * self.budget, self.budget)
 
     @cached_property
     def switch(self) -> FloatArray:
@@ -222,11 +222,14 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
     limits = Limits.of(machine, toolpath.axes)
     edges = edges_of(toolpath)
     stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
-    of_all, shares = budgets_of(toolpath, machine, edges), word_shares(toolpath)
+    (of_legs, of_vertices), shares = budgets_of(toolpath, edges), word_shares(toolpath)
+    sag, chord = filter_rate(machine) + chord_rate(machine), float(np.sqrt(2.0 * chord_rate(machine)))
+    normal, lag = largest_normal(machine), _lag(machine)
     for begin, end in pairwise(stops.tolist()):
         first = edges[begin : end + 1]
         row = first[:-1]  # the segment that stands for its leg
-        budgets = of_all.part(begin, end)
+        vertex_budget = of_vertices[begin : end + 1].copy()
+        vertex_budget[[0, -1]] = 0.0
         vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
         shape = shapes_of(toolpath, row, vertex)
         curved = toolpath.curve[row] >= 0
@@ -234,7 +237,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
         moves = (
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0) | np.ptp(curves.points, axis=1).any(axis=0)
-        held = budgets.across < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
+        held = normal < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
         word, counts, differs = words_of(toolpath, row, shares)
         yield TubeRun(
             axis=np.flatnonzero(moves),
@@ -245,18 +248,18 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             curvature=toolpath.curvature[row],
             curve=np.where(curved, np.cumsum(curved) - 1, -1),
             curves=replace(curves, points=curves.points[:, :, moves]),
-            budget=budgets.leg,
-            scale=budgets.leg,
+            budget=of_legs[begin:end],
             feed=toolpath.feed[row],
-            across_max=np.where(held, budgets.across, np.inf),
+            across_max=np.full(len(row), normal if held else np.inf),
             vertex=vertex[:, moves],
-            vertex_budget=budgets.vertex,
+            vertex_budget=vertex_budget,
+            sag=sag,
+            lag=lag,
+            chord=chord,
             velocity=limits.velocity[moves],
             acceleration=limits.acceleration[moves],
             jerk=np.where(jerk_limited, limits.jerk[moves], np.inf),
             laws=_laws(toolpath, limits, moves, first, (word, counts), jerk_limited),
-            reserved=budgets.reserved,
-            share=np.full(len(row), HALF),
             **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
         )
 
@@ -294,18 +297,20 @@ def _laws(
     )
 
 
-def with_reserve(
-    run: TubeRun, toolpath: Toolpath, machine: Machine, reserved: FloatArray, share: FloatArray
-) -> TubeRun:
-    """The run with budgets that leave room for a normal acceleration of `reserved` (R,) [mm/s2] on each leg, as
-    far as that takes no more than a `share` (R,) [-] of the tolerance, and no more than that."""
-    budgets = budgets_of(toolpath, machine, run.first, reserved, share)
-    return replace(
-        run,
-        budget=budgets.leg,
-        scale=np.maximum(run.scale, budgets.leg),
-        vertex_budget=budgets.vertex,
-        reserved=budgets.reserved,
-        share=share,
-        across_max=budgets.across,
-    )
+def _lag(machine: Machine) -> FloatArray:
+    """`TubeRun.lag`: every filter is the mean over its length, here by Gauss at three places."""
+    places, weights = np.polynomial.legendre.leggauss(3)
+    later, share = np.zeros(1), np.ones(1)
+    for length in machine.fir.time_constants if machine.fir else ():
+        later = np.add.outer(later, length / 2.0 * places).ravel()
+        share = np.outer(share, weights / 2.0).ravel()
+    return np.column_stack([later, share])
+
+
+def budgets_of(toolpath: Toolpath, first: Array) -> tuple[FloatArray, FloatArray]:
+    """The tolerances (R,) of legs that hold the segments first[r] : first[r+1], first (R+1,), and those (R+1,) of the
+    vertices around them, as all tolerances beside them allow [mm]."""
+    row = first[:-1]  # the segment that stands for its leg
+    leg = np.maximum(toolpath.tolerance[row], toolpath.tolerance[row + 1])
+    beside = np.minimum(np.append(leg, np.inf), np.append(np.inf, leg))
+    return leg, np.minimum(toolpath.tolerance[first], beside)

@@ -193,8 +193,8 @@ def _stays(job: Job, found: list[FoundRun], alone: Container[int]) -> Array:
 
 
 class InTwo(NamedTuple):
-    """A search in long steps, where chords need more of the tolerance once more, and from what it finds, if that is all
-    of a run, in shorter and shorter ones; else in the first of the shorter ones from the start."""
+    """A search in long steps, and from what it finds, if that is all of a run, in shorter and shorter ones; else in the
+    first of the shorter ones from the start."""
 
     first: TubeOwn
     finer: tuple[tuple[Cut, TubeOwn], ...]
@@ -242,7 +242,7 @@ def search_run(
         return FoundRun(run, Status.ACCEPTABLE, run.left)
     guess = start.guess(k, run)
     if isinstance(solver, InTwo):
-        run, guess, solution = yield from _in_two(k, run, start, solver)
+        guess, solution = yield from _in_two(k, run, start, solver)
     else:
         solution = yield from search_with(solver, run, guess)
     steps = solution.steps
@@ -256,33 +256,25 @@ def search_run(
     )
 
 
-def _in_two(
-    k: int, run: TubeRun, start: Start, solver: InTwo
-) -> Searching[tuple[TubeRun, Guess, TubeSolution]]:
-    """The run with the budgets of the last search, the steps from which that began, and its solution."""
+def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> Searching[tuple[Guess, TubeSolution]]:
+    """The steps from which the last search began, and its solution."""
     guess = start.guess(k, run)
     found = start.in_long_steps.get(k) or (yield from solver.first.search(run, guess))
     start.in_long_steps[k] = found
     if found.steps is None or (found.kept is not None and found.kept.any()):
         if not solver.finer:
-            return run, guess, found
+            return guess, found
         cut, own = solver.finer[0]
         guess = start.guess_in(k, run, cut)
-        return run, guess, (yield from own.search(run, guess))
-    rounds = solver.finer
-    if (start.with_reserve(run, guess.leg, found).budget < run.budget).any():
-        once_more = ((start.cut, solver.first),)
-        # the last one gives back what the prices promised too much
-        rounds = (*once_more, *(rounds or once_more))
-    for cut, own in rounds:
-        wider = start.with_reserve(run, guess.leg, found)
-        finer = divided(wider, guess.leg, found, cut)
-        again = yield from searched_again(wider, found, finer, own)
+        return guess, (yield from own.search(run, guess))
+    for cut, own in solver.finer:
+        finer = divided(run, guess.leg, found, cut)
+        again = yield from searched_again(run, found, finer, own)
         if again is None or again.steps is None:
             continue
         if own.smooth or again.steps.h.sum() <= found.steps.h.sum():
-            run, guess, found = wider, finer.guess, again
-    return run, guess, found
+            guess, found = finer.guess, again
+    return guess, found
 
 
 def tabled(

@@ -4,11 +4,10 @@ import dataclasses
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
 from planner.joint.outcome import TubeSolution
-from planner.joint.refine import reserve_for
-from planner.joint.run import TubeRun, with_reserve
+from planner.joint.run import TubeRun
 from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
 from planner.planning.job.by_run import RunsInTime
@@ -27,7 +26,7 @@ class Start(RunsInTime):
 
     def __init__(self, motion: MotionInTime, job: Job, cut: Cut = DEFAULT_CUT):
         super().__init__(motion, job)
-        self.cut, self._job = cut, job
+        self.cut = cut
         self._guesses: dict[int, Guess] = {}
         self.in_long_steps: dict[int, TubeSolution] = {}
 
@@ -42,13 +41,6 @@ class Start(RunsInTime):
         if k not in self._guesses:
             self._guesses[k] = self.guess_in(k, run, self.cut)
         return self._guesses[k]
-
-    def with_reserve(self, run: TubeRun, leg: Array, found: TubeSolution) -> TubeRun:
-        """A run whose budgets leave room for the chords of the motion that was found along it, and for the
-        filters behind them, and no more; leg (N,) of its steps."""
-        toolpath, machine = self._job.toolpath, self._job.machine
-        reach = machine.dt + sum(machine.fir.time_constants if machine.fir else ()) / 2.0
-        return with_reserve(run, toolpath, machine, *reserve_for(run, leg, found, reach))
 
     def guess_in(self, k: int, run: TubeRun, cut: Cut) -> Guess:
         """The motion along run k, cut into steps; exact at the nodes, so that parts of it can stay."""

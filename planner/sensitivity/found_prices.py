@@ -13,7 +13,6 @@ Where the programmed feed and an axis velocity hold together, more of one alone 
 motion has, that part is what counts. Where the start's motion stays nothing is priced.
 """
 
-import dataclasses
 from math import fsum  # `sum` rounds otherwise from Python 3.12 on
 
 import numpy as np
@@ -22,11 +21,10 @@ from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.limits import ACCELERATION, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.joint import price
-from planner.joint.budgets import Budgets, budgets_of
 from planner.joint.own_laws import Where, motion_at
 from planner.joint.parts import FoundRun
 from planner.machine import Machine
-from planner.sensitivity.prices import MORE_LIMIT, STEP, dearest, more_of, price_list
+from planner.sensitivity.prices import MORE_LIMIT, dearest, price_list
 from planner.sensitivity.records import PlacePrices, PriceList
 
 QUANTITIES = JERK, ACCELERATION, VELOCITY  # in the order of the columns of joint/price.py
@@ -60,7 +58,6 @@ class RunPrices:
         self.segment = first + np.searchsorted(along, self.middle, side="right")
         legs = len(found.run)
         self.room = np.bincount(self.leg, self.of(price.ROOM), legs)
-        self.normal = np.bincount(self.leg, self.of(price.NORMAL), legs)
         self.vertex = np.bincount(self.leg, self.of(price.VERTEX), legs + 1)
 
     def of(self, column: int) -> FloatArray:
@@ -118,7 +115,7 @@ def found_prices(
     if not runs:
         return None
     limit, slope = _of_limits(toolpath, machine, runs)
-    of_tolerance = _OfTolerance(toolpath, machine, runs)
+    of_tolerance = _OfTolerance(toolpath, runs)
     return price_list(
         limit,
         slope,
@@ -142,38 +139,11 @@ def _of_limits(
         for k, axis in enumerate(toolpath.axes):
             name = kind.called(axis)
             limit[name], slope[name] = float(values[k]), fsum(run.of_axis(quantity, k) for run in runs)
-            if kind is ACCELERATION:
-                slope[name] += _by_budgets(toolpath, machine, runs, more_of(machine, name, STEP))
     for run in runs:
         for name, (least, cost) in run.of_laws().items():
             limit[name] = min(least, limit.get(name, np.inf))
             slope[name] = slope.get(name, 0.0) + cost
     return limit, slope
-
-
-def _by_budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices], changed: Machine) -> float:
-    """dT/d(ln limit) through eq. (20), from a machine with `STEP` more of a limit [s]."""
-    total = 0.0
-    for run, before, after in zip(
-        runs, _budgets(toolpath, machine, runs), _budgets(toolpath, changed, runs), strict=True
-    ):
-        total += float(run.room @ np.log(after.leg / before.leg))
-        total += float(run.normal @ np.log(after.across / before.across))
-        total += float(run.vertex[1:-1] @ np.log(after.vertex[1:-1] / before.vertex[1:-1]))
-    return total / STEP
-
-
-def _budgets(toolpath: Toolpath, machine: Machine, runs: list[RunPrices]) -> list[Budgets]:
-    """Those of the runs, made again all at once: behind each run there is a leg that nobody reads."""
-    found = [run.found.run for run in runs]
-    first = np.concatenate([one.first for one in found])
-    reserved, share = (
-        np.concatenate([np.append(getattr(one, name), 0.0) for one in found])[:-1]
-        for name in ("reserved", "share")
-    )
-    made = budgets_of(toolpath, machine, first, reserved, share)
-    begin = np.cumsum([0, *(len(one) + 1 for one in found)]).tolist()
-    return [made.part(lo, lo + len(one)) for lo, one in zip(begin, found, strict=False)]
 
 
 class _OfTolerance:
@@ -183,18 +153,12 @@ class _OfTolerance:
     alone    : (M+1,) of a joint alone, with the segments beside it whose budget grows; 0 of full stops
     """
 
-    def __init__(self, toolpath: Toolpath, machine: Machine, runs: list[RunPrices]):
+    def __init__(self, toolpath: Toolpath, runs: list[RunPrices]):
         self.together = np.zeros(len(toolpath) + 1)
         vertex, segment = np.zeros(len(toolpath) + 1), np.zeros(len(toolpath))
-        wider = dataclasses.replace(toolpath, tolerance=toolpath.tolerance * (1.0 + STEP))
-        budgets = (_budgets(one, machine, runs) for one in (toolpath, wider))
-        for run, before, after in zip(runs, *budgets, strict=True):
+        for run in runs:
             first = run.found.run.first
-            room, normal = (
-                np.log(a / b) / STEP for a, b in ((after.leg, before.leg), (after.across, before.across))
-            )
-            paid = run.of(price.ROOM) * room[run.leg] + run.of(price.NORMAL) * normal[run.leg]
-            at_vertex = run.vertex[1:-1] * np.log(after.vertex[1:-1] / before.vertex[1:-1]) / STEP
+            paid, at_vertex = run.of(price.ROOM), run.vertex[1:-1]
             of_vertex = np.bincount(run.nearer_end(), paid, len(first)).astype(np.float64)
             of_vertex[1:-1] += at_vertex
             np.add.at(self.together, first, of_vertex / toolpath.tolerance[first])

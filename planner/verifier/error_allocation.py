@@ -17,16 +17,17 @@ The sum is attained where every axis gives all it has, so the bound cannot be sm
 motion that takes a corner of curvature kappa as if nothing limited the acceleration exceeds it as soon as
 kappa feed^2 > A(n).
 
-**Eq. (18), the budget.** Let the motion pass the vertex at the distance `miss`. What drives are given are
-samples: over a period dt the motion bows from its chord by at most |a_n| dt^2/8 across, wherever the samples
-fall, and from a cubic, where the machine runs these, by a quarter of that (filtered.py). Hence no chord
-passes the vertex at more than
+**Eq. (18), the budget.** Let the motion pass the vertex at the distance d from it. What drives are given are
+samples: over a period dt the chord bows from the motion by c a, c <= dt^2/8, wherever the samples fall (to second
+order in dt, as in the paper), and a cubic, where the machine runs these, by a quarter of that (filtered.py). Hence the
+chord passes the vertex V at no more than
 
-    miss + kappa feed^2 dt^2 / 8  <=  eps                            (to second order in dt, as in the paper)
+    max( |p - V|, |p + a dt^2/8 - V| )  <=  eps         at any one time t; <= miss + kappa feed^2 dt^2/8 at the nearest point
 
-if the budget is kept for all phases of the samples. Where there are samples alone, the distance of the vertex
-from their chords has both errors in it. Both are judged: the sum, and the chords that were delivered. What
-filters behind the drives add is not in here.
+and the budget is kept for all phases of the samples. This is the sum of the paper where both errors point the same way, as
+at the apex of its corner. It is looked at where the motion is nearest to V, and where that is not enough within a period of
+that. Where there are samples alone, the distance of the vertex from their chords has both errors in it. Both are judged:
+this, and the chords that were delivered. What filters behind the drives add is not in here.
 
 **Eq. (20), the gain.** The paper's own corner, the polynomial Bezier pair between straight legs that are long
 enough, has kappa = (2/3) tan^2(theta/2) / eps_ap, and with c = dt^2/8 + sum_i T_i^2/24 (filters of lengths
@@ -61,6 +62,8 @@ from planner.verifier.worst import ROUNDING_ULPS, Limits
 
 # Steps of Newton's method to the motion's nearest point, from at most a period away.
 NEAREST_STEPS = 3
+# Times within a period of it at which eq. (18) is looked at, and then around the best of them, so many times.
+TIMES, CLOSER = 17, 4
 AT_ONCE = SIZES.corners_at_once
 
 
@@ -121,7 +124,11 @@ def check_corners(
         reading = _joined([_nearest_point(motion, when[n], trajectory.dt, vertex[n], machine) for n in parts])
         speed_ratio = np.maximum(speed_ratio, reading.speed_ratio)
         miss, chord = reading.distance, bow_share(machine) * reading.normal * trajectory.dt**2
-        budget_ratio = np.maximum(budget_ratio, (miss + chord) / eps)
+        together = miss + chord
+        over = np.flatnonzero(together > eps)
+        bow = bow_share(machine) * trajectory.dt**2
+        together[over] = _least_miss(motion, reading.time[over], trajectory.dt, vertex[over], bow)
+        budget_ratio = np.maximum(budget_ratio, together / eps)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.where(reading.normal > 0, reading.feed * np.sqrt(reading.allowed / reading.normal), np.inf)
 
@@ -225,6 +232,31 @@ def _nearest_point(
         change = np.divide((off * velocity).sum(axis=1), slope, out=np.zeros_like(time), where=slope > 0)
         time = np.clip(time - change, start - period, start + period)
     return reduce(_nearer, readings)
+
+
+def _least_miss(
+    motion: AnyMotion, nearest: FloatArray, period: float, vertex: FloatArray, bow: float
+) -> FloatArray:
+    """(C,) the least distance [mm] at which chords pass the vertices (C, A) near the times `nearest` (C,) [s] of the motion's
+    nearest points, up to a period away; bow: dt^2/8 [s2]."""
+
+    def seen(times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        unique, row = np.unique(np.clip(times.ravel(), 0.0, motion.end), return_inverse=True)
+        there = motion.at(unique, period)
+        off = there.position[row].reshape(*times.shape, -1) - vertex[:, None]
+        chord = off + bow * there.acceleration[row].reshape(off.shape)
+        return np.linalg.norm(off, axis=-1), np.linalg.norm(chord, axis=-1)
+
+    if not len(nearest):
+        return nearest
+    least: FloatArray = np.full(len(nearest), np.inf)
+    for width in period * (2.0 / (TIMES - 1)) ** np.arange(1 + CLOSER):
+        times = nearest[:, None] + width * np.linspace(-1.0, 1.0, TIMES)
+        apart = np.maximum(*seen(times))
+        best = apart.argmin(axis=1)[:, None]
+        nearest = np.take_along_axis(times, best, 1)[:, 0]
+        least = np.minimum(least, np.take_along_axis(apart, best, 1)[:, 0])
+    return least
 
 
 def _joined(readings: list[_Reading]) -> _Reading:

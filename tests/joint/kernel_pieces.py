@@ -17,7 +17,7 @@ from planner.joint.normal_rows import add_normal_curvature, put_normal_rows
 from planner.joint.recursion import Factor, backward, factor_steps, forward, gaps
 from planner.joint.rows import put_rows
 
-_THREE = size(3)
+_THREE, _PLACES = size(3), size(6)
 
 
 class Alone(NamedTuple):
@@ -45,7 +45,7 @@ def _piece(what, sizes, numbers, bends, x, u, place, work, change, out, settings
     """One of these, into `work` or `out`."""
     group, w, N = lanes_of(sizes, numbers), sizes.width, sizes.steps
     at, control = wide2(x, w, sizes.state), wide2(u, w, sizes.control)
-    rows, room = rows_in(sizes, work, wide2(place, w, _THREE)), room_of(sizes, work, at)
+    rows, room = rows_in(sizes, work, wide2(place, w, _PLACES)), room_of(sizes, work, at)
     gap, scratch = wide2(work.gap, w, sizes.state), scratch_of(sizes, bends)
     if what == LOOK:
         looking = room.y, wide2(work.nearest, w, _THREE), wide1(work.top, w)

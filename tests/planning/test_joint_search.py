@@ -191,20 +191,18 @@ def hairpin() -> tuple[Program, Machine]:
     return parse_program("G1 X5 F6000\nX4.5 Y0.3\nM2\n", machine), machine
 
 
-def test_a_search_that_passes_only_slower_in_places_is_taken_where_nothing_is_faster(
+def test_a_search_whose_chords_leave_the_tolerance_is_searched_again_with_less(
     hairpin: tuple[Program, Machine],
 ) -> None:
-    """The motion on the path has to be slower too, and takes 5 % longer then; with less tolerance there is a full stop."""
+    """The motion on the path has to be slower in places, and takes 5 % longer then."""
     told = Trace()
     found = planner.plan(*hairpin, effort="quick", log=told)
     assert found.verdict is not None
     assert found.verdict.passed
     first = next(step for step in told.steps if step.name == "search")
-    mended = next(step for step in told.steps if step.name == "slower in places")
-    assert not first.kept
-    assert found.cycle_time == pytest.approx(mended.found, rel=1e-6)
+    assert first.kept
     on_path = planner.plan(*hairpin, effort="quick", geometry="spline")
-    assert found.cycle_time < 0.97 * on_path.cycle_time
+    assert found.cycle_time < 0.95 * on_path.cycle_time
 
 
 def test_a_plan_that_may_pass_with_less_tolerance_keeps_the_other_beside_it(

@@ -63,7 +63,8 @@ def fewer_lines(
     found = _Writer(data, program, machine, within, arcs=arcs).written()
     if found.after == found.before:
         said = "; ".join(
-            f"{why}: {count:,} line{'s' * (count > 1)}, first {line}" for why, (count, line) in found.kept.items()
+            f"{why}: {count:,} line{'s' * (count > 1)}, first {line}"
+            for why, (count, line) in found.kept.items()
         )
         text = f"no line can go within {plain(round(within, 6))} mm{': ' * bool(said)}{said}"
         raise InputError(text, source=program.source)

@@ -51,15 +51,14 @@ class Search:
     smooth: float = 0.0  # weight of the jerk against the time at least [-]
     again: bool = True  # search once more where that has not ended
     # steps of the motions that `finer` and `again` are meant for; longer ones are searched where a step is
-    # at least a period on the mean, and instead of `finer` once more in steps about as long, with the
-    # tolerance that chords and filters need beside what was found
+    # at least a period on the mean, and once only
     small: float = float("inf")
 
     def of(self, steps: int) -> Search:
         """That of a motion of so many steps."""
         if steps <= self.small:
             return self
-        return dataclasses.replace(self, finer=((self.cut, LARGE_GAP),), again=False)
+        return dataclasses.replace(self, finer=(), gap=LARGE_GAP, again=False)
 
 
 # Steps that are searched with the usual effort at most, a minute or two on two processors; of a small motion.

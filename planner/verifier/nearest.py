@@ -103,6 +103,7 @@ def reach_of(
 ) -> float:
     """How far the nearest place of a motion can be from what `nearest` has `found` between two ends [mm].
 
+    ends, cut, h : (2, 4, A), [s], [s] as there
     acceleration : norm of the largest one [mm/s2], inf if not judged
     rounding     : of positions [mm]
     """

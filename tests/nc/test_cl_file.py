@@ -53,6 +53,7 @@ def five_axes() -> Machine:
     return machine_from_dict(about | {"tolerance_angle": 2.0})
 
 
+@pytest.mark.shows("read-cl", "exact: places and arcs worked out by hand")
 def test_moves_arcs_and_stops() -> None:
     program = parse_program(PART)
     kinds = [Kind.STOP, Kind.RAPID, Kind.RAPID, Kind.LINE, *[Kind.ARC] * 4, Kind.LINE, Kind.DWELL, Kind.RAPID]

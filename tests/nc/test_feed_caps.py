@@ -58,6 +58,7 @@ def places(program: Program, share: float) -> np.ndarray:
     return a.center[row] + circle + a.drift[row] * x
 
 
+@pytest.mark.shows("feed-caps", "exact: the lower of F and cap, on a line")
 def test_the_lower_of_f_and_cap_holds_on_a_line(tmp_path: Path) -> None:
     program = capped(tmp_path, JOB, "line,feed\n4,1200\n5,9000\n7,600\n7,900\n")
     feed = dict(zip(program.line.tolist(), (program.feed * 60.0).tolist(), strict=True))
@@ -143,6 +144,7 @@ def test_a_plan_keeps_caps_and_leaves_them_in_all_its_files(tmp_path: Path, caps
     assert "feed-caps.csv" in refused.output
 
 
+@pytest.mark.shows("feed-caps", "sampled: a motion above a cap fails its verdict")
 def test_a_motion_above_a_cap_fails(tmp_path: Path) -> None:
     (tmp_path / "job.ngc").write_text(JOB)
     (tmp_path / "caps.csv").write_text("from_mm,to_mm,feed\n20,30,400\n")

@@ -86,6 +86,7 @@ def places(program: Program) -> list[tuple[float, ...]]:
     return [tuple(end[:3]) for end in program.end[np.isin(program.kind, MOVES)].round(9)]
 
 
+@pytest.mark.shows("read-printers", "exact: macros of Klipper, positions worked out by hand")
 @pytest.mark.parametrize(("bed", "dwell"), [(100, 2.0), (60, 0.5)])
 def test_a_start_macro_homes_lifts_and_purges(voron: Machine, bed: int, dwell: float) -> None:
     program = parse_program(JOB.format(bed=bed), voron)

@@ -28,6 +28,7 @@ def on(machine: Machine, made: Plan = MADE, **how: tuple[str, ...]) -> Verdict:
     return judged(motion, Judged(program=made.program, toolpath=made.toolpath, machine=machine, **how))
 
 
+@pytest.mark.shows("travel", "exact: how far a motion goes beyond")
 @settings(deadline=None, max_examples=25)
 @given(st.floats(11.0, 60.0), st.sampled_from("xy"), st.booleans())
 def test_a_motion_beyond_the_travel_fails_by_how_far_it_goes(end: float, axis: str, other: bool) -> None:

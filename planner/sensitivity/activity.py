@@ -52,6 +52,10 @@ def history(problem: FeedrateProblem, solution: FeedrateSolution, t: FloatArray,
 
 
 def times_of(reached: Array, lasting: FloatArray) -> FloatArray:
-    """(n,) how long each of n limits is active [s]; `reached` (P, n) in intervals that last so long (P,). As a product of
-    matrices it would take `reached` as floats."""
+    """(n,) how long each of n limits is active [s].
+
+    reached : (P, n) whether it is
+    lasting : (P,) of the intervals [s]
+
+    As a product of matrices it would take `reached` as floats."""
     return np.array([lasting[here].sum() for here in reached.T])

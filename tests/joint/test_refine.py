@@ -140,4 +140,4 @@ def test_chords_and_filters_keep_the_tolerance_at_every_phase(lengths: tuple[flo
         along, off = np.diff(nodes, axis=0), corner - nodes[:-1]
         share = np.clip((off * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-18), 0.0, 1.0)
         misses.append(np.linalg.norm(off - share[:, None] * along, axis=1).min())
-    assert 0.97 * machine.tolerance < max(misses) <= machine.tolerance * (1.0 + 2e-3)
+    assert 0.96 * machine.tolerance < max(misses) <= machine.tolerance * (1.0 + 2e-3)

@@ -18,7 +18,6 @@ from planner.machine import Axis, Machine
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.planning import joint_search
-from planner.planning.job import runs_alone
 from planner.planning.job.choice import beside
 from planner.planning.job.stages import Stages
 from planner.planning.job.trace import Trace
@@ -128,7 +127,7 @@ def test_a_run_that_breaks_its_verdict_is_planned_alone(monkeypatch):
 
 
 def test_a_run_that_is_not_found_nor_planned_alone_is_that_of_the_motion_on_the_path(monkeypatch):
-    monkeypatch.setattr(runs_alone, "ALONE_MOST", 0)
+    monkeypatch.setattr(joint_search, "ALONE_MOST", 0)
     own = joint_search.search_run
 
     def one_fails(k, run, *more):

@@ -12,11 +12,13 @@ from planner.delivery import mending
 from planner.delivery.pacing import runs_of, slower_runs
 from planner.delivery.periods import Standing
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Joint
 from planner.machine import load_machine
 from planner.motion.slowed import Slowed
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job
 from planner.planning.job.stages import Stages
+from planner.planning.job.trace import Trace
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.registry import plan
 from planner.verifier.excess import Excess, Fault, Kind
@@ -151,6 +153,39 @@ def test_how_much_slower_an_excess_has_to_be():
 def test_methods_that_exceed_limits_on_purpose_are_delivered_as_they_are():
     text = "G21 G90 G64 P0.02 F6000\nG1 X2\nX4 Y1\nX6\nM2\n"
     assert not plan(parse_program(text), "mill", method="fir-plain").verdict.passed
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Careless(KinematicMethod):
+    """Takes more than the tolerance at one corner of a job of many runs."""
+
+    share: float = 0.0
+
+    def plan_job(self, job):
+        tolerance = job.toolpath.tolerance.copy()
+        corner = np.flatnonzero(job.toolpath.joint == Joint.CORNER)
+        if len(corner) > 1:
+            tolerance[corner[len(corner) // 2]] *= 1.0 + self.share
+        loose = dataclasses.replace(job.toolpath, tolerance=tolerance)
+        return super().plan_job(dataclasses.replace(job, toolpath=loose, judged=job.real))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.005, 0.2])
+def test_a_corner_beyond_the_tolerance_costs_its_run(share):
+    """The path itself leaves the tolerance there, which no slower motion mends: its run is planned by itself."""
+    job = job_of(["wide", "jerk"] * 250)
+    program, machine = job.program, MACHINE.model_copy(update={"normal_acceleration": None})
+    plain = KinematicMethod().plan(program, machine)
+    assert plain.verdict.passed
+    careless = Careless(share=(1.0 + share) / plain.verdict.corners.worst_budget_ratio - 1.0)
+    broken = careless.plan_job(dataclasses.replace(job, machine=machine)).verdict
+    assert broken.corners.worst_budget_ratio >= 1.0 + 0.9 * share
+    told = Trace()
+    made = careless.plan(program, machine, log=told)
+    assert made.verdict.passed, made.verdict.faults
+    assert [step.facts["runs"] for step in told.steps if step.name == "runs alone"] == [1]
+    assert abs(made.cycle_time / plain.cycle_time - 1.0) < WORTH
 
 
 @pytest.mark.parametrize(("again", "before"), [(0, 1.0), (mending.BOTH_SIDES, 1.1 ** (1.0 / 3.0))])

@@ -22,6 +22,9 @@ from planner.verifier import OF_CHORDS, Kind, Verdict
 
 # So often a motion is mended and judged again, each time at other times.
 ROUNDS = 6
+# Rounds may find a few other places each time, between those that were looked at: from this round on all of the
+# motion is slower, by so many times what its worst place asks for, if that is no more than `LITTLE` [-].
+EVERYWHERE, TWICE, LITTLE = 4, 2.0, 1e-3
 MOST_SLOWER = 2.0  # [-]
 # What is slowed down is slowed down by this much more [-], and so many times that each time again.
 MORE, MORE_AGAIN = 1e-5, 4.0
@@ -58,6 +61,8 @@ def mended(
     if again >= BOTH_SIDES:
         edges[:, 0] -= 2.0 * AT_REST
     edges = without_stands(np.stack(stands, axis=1), edges.ravel())[0].reshape(-1, 2)
+    if again >= EVERYWHERE and slower.max() <= 1.0 + LITTLE:
+        edges, by = np.array([[0.0, np.inf]]), np.array([TWICE * (slower.max() - 1.0) + MORE])
     w, pad = _reach(verdict), PERIODS * dt
     jerk_limited = any(name.startswith("jerk") and check.limited for name, check in verdict.limits.items())
     if isinstance(motion, ShapedMotion):  # what its copies are of

@@ -37,7 +37,7 @@ from planner.planning.job.choice import counted_time
 from planner.planning.job.job import Job
 from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
-from planner.planning.job.runs_alone import with_runs_alone
+from planner.planning.job.runs_alone import ALONE_MOST, with_runs_alone
 from planner.planning.joint_start import Start
 from planner.planning.optimal.effort import Search, Settings
 from planner.planning.optimal.notes import path_notes
@@ -129,8 +129,9 @@ def joint_plan(
             job,
             parts,
             others.alone,
-            lambda: None if (path := others.kept(job)) is None else RunsInTime(path[1], job),
+            ALONE_MOST,
             settings.not_limited,
+            kept=lambda: None if (path := others.kept(job)) is None else RunsInTime(path[1], job),
         )
     slower = made.delivered.slower if made else None
     time = made.delivered.trajectory.cycle_time if made and not slower else np.nan

@@ -3,7 +3,8 @@
   path       the programmed path with its joints and tolerances, and the limits on it                       geometry/, machine/
   motion     the method's attempts, one after the other: each makes a motion and delivers it (job.py):
              slower where filters behind the setpoints ask for it, sampled, judged by the verifier          planning/attempts.py
-  again      what the verdict finds: all of it with less tolerance (less_tolerance.py), or slower in places
+  again      what the verdict finds: single runs planned by themselves (runs_alone.py), all of it with less
+             tolerance (less_tolerance.py), or slower in places
   shares     on machines with filters: all of that once more with less of the tolerance for the path
   finish     what limits and tolerance cost                                                                 sensitivity/
 
@@ -19,23 +20,28 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.feedrate.constraints.extruder import with_extruder_limit
-from planner.feedrate.constraints.limits import TANGENTIAL, TANGENTIAL_JERK, Limits
+from planner.feedrate.constraints.limits import JERK, TANGENTIAL, TANGENTIAL_JERK, Limits
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine
+from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import require_samples
 from planner.nc.extents import travel_faults
 from planner.nc.faults import require_none
 from planner.nc.program import Program
 from planner.planning.attempt import Attempt, Tried
+from planner.planning.job.by_run import RunsInTime, broken_runs, full_stops
 from planner.planning.job.choice import beside, faster, inside, not_in_step, passed, shown_time
 from planner.planning.job.job import Job
 from planner.planning.job.less_tolerance import with_less_tolerance
 from planner.planning.job.plan import Plan
+from planner.planning.job.runs_alone import with_runs_alone
 from planner.planning.job.stages import Progress, Stages
 from planner.planning.job.trace import Log
 from planner.planning.optimal.effort import Settings
 from planner.sensitivity.path_prices import path_prices
 
+# Runs on which the verdict finds something are planned by themselves where they are no more of all [-].
+ALONE_SHARE = 0.1
 # Of motions in closed form less of the tolerance for the path may be faster (`Method.ways`).
 CLOSED_FORM_WAYS = ((1.0, 0.5), (0.8, 0.35), (0.25, 0.35), (0.1, 0.25))
 
@@ -143,7 +149,12 @@ def within_tolerance(job: Job, method: Method) -> Plan:
     made = method.plan_job(job)
     if made.verdict is None or (made.verdict.passed and (inside(made) or not method.keeps_tolerance)):
         return made
-    again = with_less_tolerance(job, made, method.plan_job) if method.keeps_tolerance else made
+    again = made
+    if method.keeps_tolerance:
+        alone = _runs_alone(job, made, method)
+        again = alone or made
+        if not passed(again):
+            again = faster(with_less_tolerance(job, made, method.plan_job), again.slower_in_places())
     return faster(again, made.slower_in_places())
 
 
@@ -163,6 +174,36 @@ def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan
             tried = attempt.make(job, settings, tried)
     assert tried.best is not None
     return tried.best if tried.slower is None else beside(tried.best, tried.slower, job)
+
+
+def _runs_alone(job: Job, made: Plan, method: Method) -> Plan | None:
+    """The plan with the runs on which its verdict finds something planned each by itself, and all others as
+    they are; None where these are not few, or what comes of it does not pass, not even slower in places."""
+    machine, toolpath = job.real
+    making, verdict, stops = made.making, made.verdict, full_stops(job.toolpath)
+    if (
+        making is None
+        or verdict is None
+        or machine.fir is not None
+        or isinstance(making.motion, ShapedMotion)
+    ):
+        return None
+    if len(stops) < 3 or len(stops) != len(full_stops(toolpath)):
+        return None
+    runs = RunsInTime(making.motion, job)
+    broken, few = broken_runs(runs.edges, verdict), ALONE_SHARE * (len(stops) - 1)
+    if not 0 < len(broken) <= few:
+        return None
+    parts = [None if k in broken else [runs.spliced(k)] for k in range(len(stops) - 1)]
+    jerk = verdict.limits.get(JERK.called(toolpath.axes[0]))
+    not_limited = () if jerk is None or jerk.limited else ("jerk",)
+    found = with_runs_alone(job, parts, lambda of_run: within_tolerance(of_run, method), few, not_limited)
+    if found is None:
+        return None
+    grid = made.grid
+    if grid is not None:
+        grid = dataclasses.replace(grid, t=np.interp(grid.t, runs.edges, found.begin))
+    return made.delivering(found.delivered, grid=grid, notes=(*made.notes, *found.notes))
 
 
 def _finished(best: Plan, job: Job) -> Plan:

@@ -122,6 +122,35 @@ def test_one_place_of_a_long_run_costs_less_than_the_run():
     assert job.deliver(slower)[1].passed
 
 
+@pytest.mark.parametrize("ratio", [1.0002, 1.05])
+def test_what_is_a_little_too_much_everywhere_makes_all_slower_at_last(ratio, monkeypatch):
+    """A judge that looks at two times, others in each round: place by place it would go on for ever. What is more than a little is
+    not made slower everywhere."""
+    job = job_of(["jerk"] * 60)
+    made, motion = planned(job)
+    rng, looked = np.random.default_rng(5), []
+
+    def faked(_setpoints, _toolpath, _machine, *, motion, **_how):
+        times, step = np.sort(rng.uniform(0.1, 0.9, 2)) * motion.end, 1e-6
+        pace = np.ones(2)
+        if isinstance(motion, Slowed):
+            pace = step / (motion.was_at(times + step) - motion.was_at(times))
+        looked.append(times)
+        excesses = tuple(
+            Excess(kind=Kind.LIMIT, name="jerk", begin=t, end=t, ratio=ratio / p**3, power=3)
+            for t, p in zip(times.tolist(), pace.tolist(), strict=True)
+            if p**3 < ratio
+        )
+        faults = of_kinds(Kind.LIMIT) if excesses else ()
+        return dataclasses.replace(made.verdict, passed=not faults, faults=faults, excesses=excesses)
+
+    monkeypatch.setattr("planner.planning.job.job.verify", faked)
+    verdict, slower = job.deliver(motion)[1:3]
+    assert verdict.passed == (ratio < 1.0 + mending.LITTLE)
+    assert slower.end / motion.end - 1.0 < 2.0 * mending.LITTLE
+    assert mending.EVERYWHERE < len(looked) <= 1 + mending.ROUNDS
+
+
 def test_what_is_no_excess_is_not_mended():
     job = job_of(["feed", "jerk"])
     made, motion = planned(job)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from planner.base.errors import NotSolvedError
 from planner.base.names import AUTO, SINGLE_CORNERS, SPLINE
@@ -110,15 +110,19 @@ class Plan(Shown):
         """The events while the axes stand still, and how long they take; no part of the cycle time."""
         return beside_motion(self.program, self.machine)
 
+    def delivering(self, made: Delivered, **changes: Any) -> Plan:
+        """The plan with another motion, which has its prices, and with other `changes` of its fields."""
+        making = self.making and self.making._replace(motion=made.motion, slower=made.slower)
+        motion: dict[str, Any] = {"trajectory": made.trajectory, "verdict": made.verdict, "making": making}
+        return replace(self, **motion | changes)
+
     def slower_in_places(self) -> Plan:
         """The plan with its motion run slower where the verdict found something, or the one that there is instead, the
         faster of those that there are; else as it is."""
         if self.making is None:
             return self
-        slower, instead, mended = self.making.slower, self.making.instead, self
-        if slower is not None:
-            making = self.making._replace(motion=slower.motion, slower=slower.slower)
-            mended = replace(self, trajectory=slower.trajectory, verdict=slower.verdict, making=making)
+        slower, instead = self.making.slower, self.making.instead
+        mended = self if slower is None else self.delivering(slower)
         if instead is None or (slower is not None and mended.cycle_time <= instead.cycle_time):
             return mended
         return instead

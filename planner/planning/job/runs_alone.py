@@ -31,11 +31,12 @@ def with_runs_alone(
     job: Job,
     parts: Sequence[list[SplicedRun] | None],
     planned: Callable[[Job], Plan],
-    kept: Callable[[], RunsInTime | None],
-    not_limited: tuple[str, ...],
+    most: float,
+    not_limited: tuple[str, ...] = (),
+    kept: Callable[[], RunsInTime | None] = lambda: None,
 ) -> Alone | None:
     """The motion with those runs planned by themselves that have no parts, and then those on which the
-    verdict finds something. Where these are more than `ALONE_MOST` or all, or one of them does not pass, they are
+    verdict finds something. Where these are more than `most` or all, or one of them does not pass, they are
     of the motion that is `kept`; None without one, and where the whole does not pass, not even slower in
     places: what is left at last is the motion with the least time when it is.
 
@@ -48,7 +49,7 @@ def with_runs_alone(
     new = [k for k, part in enumerate(runs) if part is None]
     least, slowed = np.inf, None
     for _ in range(VERDICTS):
-        few = len(plans) + len(new) <= min(ALONE_MOST, len(runs) - 1)
+        few = len(plans) + len(new) <= min(most, len(runs) - 1)
         for k in new:
             plan = planned(job_of_run(job, int(stops[k]), int(stops[k + 1]))) if few else None
             if plan and plan.making and plan.verdict and plan.verdict.passed:

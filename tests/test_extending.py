@@ -58,7 +58,9 @@ def test_the_method_is_judged_like_others(seen):
 def test_methods_are_compared(seen):
     rows = {row.method: row for row in seen["rows"]}
     assert set(rows) == {"bezier", "Gentle(0.5)", "Gentle(0.25)"}
-    assert {row.outcome for row in seen["rows"]} == {"passed"}, [(row.method, row.sentence) for row in seen["rows"]]
+    assert {row.outcome for row in seen["rows"]} == {"passed"}, [
+        (row.method, row.sentence) for row in seen["rows"]
+    ]
     assert rows["Gentle(0.25)"].cycle_time > rows["Gentle(0.5)"].cycle_time
 
 

@@ -45,6 +45,8 @@ from planner.machine.user_limit import QUANTITIES
 # Fraction of the budget that a step on an arc or a curve may use for what that is off its own cubic [-], and
 # the largest angle that it turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
+STRAIGHT = 1e-6  # differences of directions that are one [-]: chords are off by as much of what they are ahead
+_AS_IT_IS = np.array([[0.0, 1.0]])  # `TubeRun.lag` without filters
 # Without limits of the jerk the scale of steps, as a share of the time in which the full acceleration moves an
 # axis by the budget [-]: finer ones take more steps and end hardly sooner.
 SHARP = 0.25
@@ -237,6 +239,10 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
         moves = (
             np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
         ).any(axis=0) | np.ptp(curves.points, axis=1).any(axis=0)
+        # chords of a motion along a line, and its mean, are on it: what they are ahead or behind by is no distance
+        straight = (
+            not (curved.any() or shape["radius"].any()) and np.ptp(shape["drift"], axis=0).max() < STRAIGHT
+        )
         held = normal < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
         word, counts, differs = words_of(toolpath, row, shares)
         yield TubeRun(
@@ -253,9 +259,9 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             across_max=np.full(len(row), normal if held else np.inf),
             vertex=vertex[:, moves],
             vertex_budget=vertex_budget,
-            sag=sag,
-            lag=lag,
-            chord=chord,
+            sag=0.0 if straight else sag,
+            lag=_AS_IT_IS if straight else lag,
+            chord=0.0 if straight else chord,
             velocity=limits.velocity[moves],
             acceleration=limits.acceleration[moves],
             jerk=np.where(jerk_limited, limits.jerk[moves], np.inf),

@@ -14,8 +14,7 @@ and jerks 1/k^3 of what they were, whence (Euler)
 but for the pull on durations (nlp.py) and the rows in `OTHER`, which are no limits: bounds of durations, the
 order along the leg, the largest length of a step on an arc, the place of a change of the feed.
 
-The tolerance acts through what eq. (20) leaves of it for the path (run.py): priced is the room of every leg
-and of every vertex.
+The tolerance is priced as the room of every leg and of every vertex, for setpoints and chords together.
 """
 
 import numpy as np
@@ -44,7 +43,8 @@ def step_prices(run: TubeRun, window: StepWindow, z: FloatArray) -> FloatArray:
     axes = window.limits.box.shape[1]
     box, more = z[:, : 8 * axes].reshape(-1, 4, 2, axes).sum(axis=2), z[:, 8 * axes :]
     at_vertex = window.limits.at_vertex
-    node = more[:, rows.TUBE_NODE]
+    tube = more[:, rows.TUBE_NODE : rows.ORDER_NODE].reshape(len(z), rows.SETS, 3).sum(axis=1)
+    node = tube[:, 0]
     none = np.zeros(len(z))
     price = np.column_stack(
         [
@@ -53,7 +53,7 @@ def step_prices(run: TubeRun, window: StepWindow, z: FloatArray) -> FloatArray:
             box[:, 2] + box[:, 3],
             more[:, rows.FEED_NODE : rows.TUBE_NODE].sum(axis=1),
             more[:, rows.NORMAL_NODE] + more[:, rows.NORMAL_ROWS : rows.LAW_ROWS].sum(axis=1),
-            more[:, rows.TUBE_NODE + 1 : rows.ORDER_NODE].sum(axis=1) + np.where(at_vertex, none, node),
+            tube[:, 1:].sum(axis=1) + np.where(at_vertex, none, node),
             np.where(at_vertex, node, none),
             more[
                 :, [rows.H_MAX, rows.H_MIN, rows.ORDER_NODE, rows.ORDER_MID, rows.ARC, rows.SWITCH, rows.SIDE]

@@ -45,7 +45,7 @@ from planner.machine.user_limit import QUANTITIES
 # Fraction of the budget that a step on an arc or a curve may use for what that is off its own cubic [-], and
 # the largest angle that it turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
-STRAIGHT = 1e-6  # differences of directions that are one [-]: chords are off by as much of what they are ahead
+STRAIGHT = 1e-6  # differences of directions that count as one [-]
 _AS_IT_IS = np.array([[0.0, 1.0]])  # `TubeRun.lag` without filters
 # Without limits of the jerk the scale of steps, as a share of the time in which the full acceleration moves an
 # axis by the budget [-]: finer ones take more steps and end hardly sooner.

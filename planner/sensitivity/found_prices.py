@@ -1,10 +1,8 @@
 """The prices of limits and tolerance where path and feed were found together, from its multipliers.
 
 Its motion has no path of its own: what a multiplier prices is the time with the path free to follow. So
-nothing is solved again. A limit acts at every step through its price there; the tolerance, and accelerations
-once more, through what eq. (20) leaves for the path,
-
-    dT  =  sum of room d(ln eps_ap) + vertex d(ln eps_ap) + normal d(ln X)        over legs and vertices, from budgets made again.
+nothing is solved again. A limit acts at every step through its price there, the tolerance through the rooms of legs
+and vertices, which are in proportion to it.
 
 Finite changes are foretold as prices.py says.
 

@@ -40,7 +40,7 @@ class Feeds:
     def take(self, new: Chords, skip: int) -> None:
         """The next samples, as `Switches.take`."""
         self._switches.take(new, skip)
-        new = Chords(*(column[skip:].copy() for column in new))
+        new = Chords(*(column[skip:].copy() for column in new._replace(state=new.state[:, :1])))
         before = self._left[-1].t[-1:] if self._left else new.t[:1]
         self._left += [new] if len(new.t) else []
         gap = self._gap = float(np.diff(new.t, prepend=before).max(initial=self._gap))

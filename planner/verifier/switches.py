@@ -196,11 +196,10 @@ def _look(
         return
     _, step, h, cut, rounding = chord
     bow = bounds.acceleration * h * h / 8.0
-    _put_ends(found.ends[at], new, k)
     for i in range(first, last + 1):
         _, _, apart = reach_chord(new.state[k - 1, 0], new.state[k, 0], pieces, i, 0.0)
         if cut >= 0.0 and before + max(apart - bow, 0.0) ** 2 < switch[i]["cost"]:
-            apart, _, _, _ = nearest(pieces.vertex[i], found.ends[at], cut, h)
+            apart, _, _, _ = nearest(pieces.vertex[i], new.state[k - 1 : k + 1], cut, h)
         cost = before + apart * apart
         if pieces.joint[i]["stop"] and (
             step > 4.0 * bow + 2.0 * rounding or apart > bow + rounding + PLACE_ROUNDING
@@ -214,8 +213,8 @@ def _look(
     # nearer than ever, and no other vertex: what was before does not matter
     if last == first and found.mark[state[USED]]:
         at = state[HEAD] = 0
-        _put_ends(found.ends[at], new, k)
         found.mark[0], state[USED], along[SURE] = True, 0, chord[0]
+    _put_ends(found.ends[at], new, k)
     row = found.chord[at]
     row["first"], row["count"], row["offset"] = first, last + 1 - first, state[USED]
     row["begin"], row["step"], row["h"], row["cut"], row["error"] = chord

@@ -4,12 +4,14 @@
 
 Every window that a plan asks for is written down. The longest ones are then solved again, processor seconds, the least of some
 passes: on single numbers; four of the same side by side in lanes, where none waits for another; and one of
-these groups with a single window in it. Reading windows into the kernel's memory and back is in all of it.
+these groups with a single window in it: NaN where none can be in lanes (joint/window_solver.py). Reading
+windows into the kernel's memory and back is in all of it.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +24,7 @@ from benchmarks.record import markdown, write_results
 from planner.base.lanes import WIDTH
 from planner.base.threads import use_threads
 from planner.joint import groups
-from planner.joint.window_solver import Asked, solve_windows
+from planner.joint.window_solver import Asked, kind_of, solve_windows
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import parse_program, read_program
@@ -79,16 +81,20 @@ def least(asked: list[Asked], width: int, passes: int) -> float:
     return min(took)
 
 
+def mean(values: list[float]) -> float:
+    """Of these; NaN of none."""
+    return sum(values) / len(values) if values else math.nan
+
+
 def measured(name: str, windows: int, passes: int) -> dict[str, Any]:
     """One job."""
     use_threads(1)
     seen = windows_of(*jobs()[name]())
     longest = sorted(seen, key=lambda one: -len(one.window.u))[:windows]
-    rows = [
-        (least([one], 1, passes), least([one] * WIDTH, WIDTH, passes), least([one], WIDTH, passes))
-        for one in longest
-    ]
-    single, lanes, alone = (1e6 * sum(row[k] for row in rows) / len(rows) for k in range(3))
+    straight = [one for one in longest if kind_of(one) is not None]
+    single = 1e6 * mean([least([one], 1, passes) for one in longest])
+    lanes = 1e6 * mean([least([one] * WIDTH, WIDTH, passes) for one in straight])
+    alone = 1e6 * mean([least([one], WIDTH, passes) for one in straight])
     return {
         "job": name,
         "axes": longest[0].window.u.shape[1] - 1,

@@ -21,9 +21,8 @@ and so are the blocks of the model, of what G is between the vectors.
 """
 
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import pick, put, where
+from planner.base.lanes import where
 from planner.base.views import clear
-from planner.joint.lane_rows import copy_lane
 from planner.joint.law_curvature import add_law_curvature
 from planner.joint.normal_rows import add_normal_curvature, stay_of
 from planner.joint.row_kinds import (
@@ -46,6 +45,7 @@ from planner.joint.row_kinds import (
     TWELFTH,
 )
 from planner.joint.rows import bent_at, of_axis, tangent_of, turn_of
+from planner.joint.single_rows import copy_step
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -345,18 +345,13 @@ def add_normal(sizes, group, rows, i, x, u, W):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def add_laws(sizes, group, bends, rows, i, x, u, W, scratch):
-    """W += the curvature of the rows of the laws, worked out for one lane after the other."""
+    """W += the curvature of the rows of the laws."""
     more = 8 * len(sizes.axes) + LAW_ROWS
-    for lane in range(len(sizes.width)):
-        if i >= bends.steps[lane]:
-            continue
-        copy_lane(sizes, bends.at, lane, x[i], u[i], scratch)
-        for r in range(sizes.rows - more):
-            scratch.g[r] = pick(rows.z[i, more + r], lane)
-        scratch.W[:] = 0.0
-        pace = pick(group.pace[i], lane)
-        add_law_curvature(scratch.W, bends.laws[lane], i, pace, scratch.x, scratch.u, scratch.g)
-        for s in range(len(bends.at)):
-            for t in range(s + 1):
-                row, column = bends.at[s], bends.at[t]
-                W[row, column] = put(W[row, column], lane, pick(W[row, column], lane) + scratch.W[s, t])
+    copy_step(sizes, bends.at, x[i], u[i], scratch)
+    for r in range(sizes.rows - more):
+        scratch.g[r] = rows.z[i, more + r]
+    scratch.W[:] = 0.0
+    add_law_curvature(scratch.W, bends.laws, i, group.pace[i], scratch.x, scratch.u, scratch.g)
+    for s in range(len(bends.at)):
+        for t in range(s + 1):
+            W[bends.at[s], bends.at[t]] += scratch.W[s, t]

@@ -77,22 +77,21 @@ class Group(NamedTuple):
 
 
 class Bends(NamedTuple):
-    """What is worked out for one lane after the other."""
+    """Of a window that is searched by itself, what windows in lanes have not: their kernel is compiled without it."""
 
-    leg: Array  # (N, W) of `legs`
-    bent: Array  # (N, W) whether it is an arc or a curve
-    passed: Array  # (N, W) whether it is passed
-    target: FloatArray  # (N or 0, 3, A, W)
-    steps: Array  # (W,) of each window
-    legs: LegFormulas  # of all windows
-    laws: tuple[LawRows, ...]  # of each
+    leg: Array  # (N,) of `legs`
+    bent: Array  # (N,) whether it is an arc or a curve
+    passed: Array  # (N,) whether it is passed
+    target: FloatArray  # (N or 0, 3, A)
+    legs: LegFormulas
+    laws: LawRows
     at: Array  # (4 A + 1,) where the numbers of its step are among those of the kernel's
 
 
 def group_of(
     windows: list[StepWindow], width: int
-) -> tuple[Sizes, Group, Bends, FloatArray, FloatArray, FloatArray]:
-    """Up to `width` windows of the same number of axes, and x (N+1, S, W), u (N, C, W), place (N, 6, W) of them."""
+) -> tuple[Sizes, Group, Bends | None, FloatArray, FloatArray, FloatArray]:
+    """Up to `width` windows of one kind (window_solver.py), and x (N+1, S, W), u (N, C, W), place (N, 6, W) of them."""
     of = windows[0].u.shape[1] - 1
     axes = next((many for many in AXES if many >= of), of)
     counts = [len(one.u) for one in windows]
@@ -161,21 +160,11 @@ def group_of(
         per_step=1.0 / limit("step_max", 1.0),
         aside=stack([np.array([one.limits.aside]) for one in windows], 0.0, 1),
     )
-    targets = any(now.any() for now in passed)
-    lanes = [*windows, *[windows[0]] * (width - len(windows))]
-    bends = Bends(
-        leg=stack(leg).astype(int),
-        bent=stack(bent).astype(bool),
-        passed=stack(passed).astype(bool),
-        target=limit("target") if targets else np.zeros((0, 3, of, width)),
-        steps=np.array([*counts, *[0] * (width - len(windows))]),
-        legs=legs,
-        laws=tuple(one.limits.laws for one in lanes),
-        at=steps,
-    )
-    normal, laws = bool(own.any()), any(len(one.limits.laws.kind) > 0 for one in windows)
+    first, normal = windows[0].limits, bool(own.any())
+    bends = Bends(leg[0], bent[0], passed[0], first.target, legs, first.laws, steps) if width == 1 else None
+    laws = len(first.laws.kind) > 0
     which = (
-        targets or any(bool(now.any()) for now in bent),
+        bool(passed[0].any() or bent[0].any()),
         normal or laws,
         normal or bool(on[:, 8 * axes + NORMAL_NODE].any()),
         laws,

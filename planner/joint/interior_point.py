@@ -195,9 +195,7 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
     owed = zero + np.inf  # nothing has ended before the first step
     prox, before, close, still, settled = tune.prox, time, zero, zero, zero
     rho, off_before, slow = zero + END, zero + np.inf, zero
-    active = zero
-    for lane in range(len(sizes.width)):
-        active = put(active, lane, 1.0 if bends.steps[lane] else 0.0)
+    active = group.real[0]
     for iteration in range(ITERATIONS + 1):
         now = _durations(sizes, group, u, zero)
         close = where(products <= 2.0 * tune.gap * time, close + 1.0, zero)

@@ -7,7 +7,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import CONTRACT, njit
 from planner.base.views import matrix, size, vector, wide1, wide2, wide3
-from planner.joint.group import Bends, Group, Sizes
+from planner.joint.group import Group, Sizes
 from planner.joint.recursion import Room
 from planner.joint.row_kinds import NORMAL_ROWS, SETS, VECTORS, Rows, Scratch
 
@@ -42,7 +42,7 @@ class Work(NamedTuple):
     top: FloatArray
 
 
-def work_of(sizes: Sizes, bends: Bends) -> Work:
+def work_of(sizes: Sizes) -> Work:
     """Memory of a group, all 0."""
     N, R, W = sizes.steps, sizes.rows, len(sizes.width)
     A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
@@ -141,7 +141,9 @@ def room_of(sizes, work, x):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
 def scratch_of(sizes, bends):
-    """Memory for one lane."""
+    """Memory for what is worked out on single numbers; None where there is nothing."""
+    if bends is None:
+        return None
     L, of = sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS, len(bends.at) // 4
     return Scratch(
         np.zeros(3 * of),

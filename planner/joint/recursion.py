@@ -201,7 +201,7 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, prox, rho, end, fac
         put_model(sizes, group, rows, i, x[i], u[i], W, room.row)
         if sizes.any_normal:
             add_normal(sizes, group, rows, i, x, u, W)
-        if sizes.any_laws:
+        if bends is not None and sizes.any_laws:
             add_laws(sizes, group, bends, rows, i, x, u, W, scratch)
         W[S + axes, S + axes] += 2.0 * (pull + prox) * group.per_h[i] * group.per_h[i]
         for k in range(axes):

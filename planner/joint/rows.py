@@ -50,7 +50,6 @@ plane through V either that is across the direction t of the start, m (p - V).t 
 
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import anywhere, larger, magnitude, where
-from planner.joint.lane_rows import put_bent, put_laws, put_passed
 from planner.joint.normal_rows import put_normal_rows
 from planner.joint.places import put_places
 from planner.joint.row_kinds import (
@@ -84,6 +83,7 @@ from planner.joint.row_kinds import (
     P,
     V,
 )
+from planner.joint.single_rows import put_bent, put_laws, put_passed
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -145,14 +145,14 @@ def _put_radii(axes, x, u, square, per_radius):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def bent_at(sizes, group, i):
-    """Whether a window has a leg that is no line, or is passed, at step i."""
-    return sizes.any_bent and anywhere(group.line[i] < group.real[i])
+    """Whether the window has a leg that is no line, or is passed, at step i; none in lanes has (window_solver.py)."""
+    return len(sizes.width) == 1 and sizes.any_bent and anywhere(group.line[i] < group.real[i])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def tangent_of(sizes, group, rows, i, c, k):
     """Of the leg at the node (c = 0) or an inner control point."""
-    if sizes.any_bent:
+    if len(sizes.width) == 1 and sizes.any_bent:
         return where(group.line[i] > 0.0, group.drift[i, k], rows.tangent[i, c, k])
     return group.drift[i, k]
 
@@ -197,12 +197,11 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
                 else:
                     rows.n[i, c, k] = off * per
             g[more + TUBE_NODE + c] = 0.5 * (square * per - 1.0)
-        if bent:
-            for lane in range(len(sizes.width)):
-                if bends.passed[i, lane]:
-                    put_passed(axes, bends, i, lane, group, y, rows)
-                elif bends.bent[i, lane]:
-                    put_bent(axes, bends, i, lane, group, y, rows, scratch)
+        if bends is not None and bent:
+            if bends.passed[i]:
+                put_passed(axes, bends, i, group, y, rows)
+            elif bends.bent[i]:
+                put_bent(axes, bends, i, group, y, rows, scratch)
             order_node, order_mid, arc = 0.0 * h, 0.0 * h, 0.0 * h
             for k in range(axes):
                 at_node = tangent_of(sizes, group, rows, i, 0, k)
@@ -225,10 +224,8 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
                 sizes, group.normal[i], group.pace[i], group.turns[i], x[i], u[i], rows.between, rows.own[i]
             )
             g[more + NORMAL_ROWS], g[more + NORMAL_ROWS + 1] = rows.between[0], rows.between[1]
-        if sizes.any_laws:
-            for lane in range(len(sizes.width)):
-                if i < bends.steps[lane]:
-                    put_laws(sizes, bends, i, lane, group, x, u, rows, scratch)
+        if bends is not None and sizes.any_laws:
+            put_laws(sizes, bends, i, group, x, u, rows, scratch)
         for r in range(R):
             there = rows.per_s[i, r] > 0.0
             g_r = where(there, g[r], -1.0)

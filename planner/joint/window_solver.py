@@ -29,8 +29,8 @@ class Solved(NamedTuple):
 
 def kind_of(asked: Asked) -> Hashable | None:
     """What windows have in common that are solved side by side: their axes, and the iterations they take about. None for one
-    that gains nothing by it: rows of arcs, curves and laws are worked out lane by lane. For more axes no kernel with
-    lanes is compiled."""
+    with rows of arcs, curves and laws, which would be worked out lane by lane: the kernel with lanes has none of them. For
+    more axes there is none."""
     window = asked.window
     bent = bool(window.limits.passed.any() or window.legs.radius.any())
     axes = window.u.shape[1] - 1
@@ -52,7 +52,7 @@ def solve_windows(asked: Sequence[Asked], width: int) -> list[Solved]:
         np.zeros(width, np.bool_),
         np.zeros(width, np.int64),
     )
-    solve_group(sizes, group, bends, tuple(motion), tuning, work_of(sizes, bends), found)
+    solve_group(sizes, group, bends, tuple(motion), tuning, work_of(sizes), found)
     return [_solved(one.window, lane, found) for lane, one in enumerate(asked)]
 
 

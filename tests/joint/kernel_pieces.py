@@ -25,7 +25,7 @@ class Alone(NamedTuple):
 
     sizes: Sizes
     group: Group
-    bends: Bends
+    bends: Bends | None
     x: Any
     u: Any
     place: Any
@@ -34,7 +34,7 @@ class Alone(NamedTuple):
     @classmethod
     def of(cls, window: Any) -> Alone:
         sizes, group, bends, x, u, place = group_of([window], 1)
-        return cls(sizes, group, bends, x, u, place, work_of(sizes, bends))
+        return cls(sizes, group, bends, x, u, place, work_of(sizes))
 
 
 LOOK, SLOPES, MODELS, NEWTON, GAPS = range(5)

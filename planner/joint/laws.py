@@ -292,12 +292,13 @@ def _put_ends(laws, i, m, x, u, rest, f, of_f, g, out):
             value = _jolt(y, u, laws.counts[m], rest, by)
         elif kind == JOINT_SPEED and place:  # at the middle, with the ordinate w1 as the velocity
             ordinates(x, u, np.ones(axes), w, b)
-            speed = y[1].copy()
-            y[1] = w[1]
+            for k in range(axes):
+                y[1, k], w[1, k] = w[1, k], y[1, k]
             value = _of_joint(laws, i, i + 1, m, 1, y, u, by)
-            w[:], b[:], w[1] = 0.0, 0.0, by[1]
+            for k in range(axes):
+                y[1, k], w[0, k], w[1, k], w[2, k], by[1, k] = w[1, k], 0.0, by[1, k], 0.0, 0.0
+            b[:] = 0.0
             through(x, u, w, b, 1.0, row)
-            y[1], by[1] = speed, 0.0
         else:
             first = i if kind == JOINT_PUSH else i + place
             value = _of_joint(laws, first, i + place, m, kind - JOINT_SPEED + 1, y, u, by)

@@ -144,7 +144,8 @@ def formula_point(legs, r, x, point, tangent, bend):
     if legs.curve[r] >= 0:
         out = np.empty((4, len(point)))
         _curve_of(legs, r, x, out)
-        point[:], tangent[:], bend[:] = out[0], out[1], out[2]
+        for k in range(len(point)):
+            point[k], tangent[k], bend[k] = out[0, k], out[1, k], out[2, k]
         return
     radius, rate = legs.radius[r], legs.rate[r]
     cos, sin = np.cos(rate * x), np.sin(rate * x)

@@ -9,19 +9,10 @@ vectors is, by p, v, a, j and h, for every axis (`spread`)
     j   f_J + h2 f_2/12 + h2 f_3/4
     h   e.f,   e = a/2, a/4, a/2 + h j/6, 3 a/4 + h j/2 of MID, 1, 2, 3
 
-and by a set of the tolerance, of the state q = p + k a, w = v + k j, a (`of_state`)
-
-    p   f_q                        f_q = f_P + f_C1 + f_C2
-    v   f_w                        f_w = h f_C1/3 + 2 h f_C2/3
-    a   h2 f_C2/6 + k f_q
-    j   k f_w
-    h   (w f_C1 + (2 w + h a) f_C2)/3
-
-and so are the blocks of the model, of what G is between the vectors.
+and so are the blocks of the model, of what G is between the vectors. Sets of the tolerance are in tube_curvature.py.
 """
 
 from planner.base.kernels import CONTRACT, njit
-from planner.base.lanes import where
 from planner.base.views import clear
 from planner.joint.law_curvature import add_law_curvature
 from planner.joint.normal_rows import add_normal_curvature, stay_of
@@ -46,6 +37,7 @@ from planner.joint.row_kinds import (
 )
 from planner.joint.rows import bent_at, of_axis, tangent_of, turn_of
 from planner.joint.single_rows import copy_step
+from planner.joint.tube_curvature import of_state, tube_block, tube_by_h, tube_weights
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -53,12 +45,6 @@ def spread(h, f_mid, f_1, f_2, f_3):
     """By v, a and j what is f by the vectors that are of several of them (module text)."""
     by_a = h * (0.5 * (f_mid + f_2) + 0.25 * f_1 + 0.75 * f_3)
     return f_mid + f_1 + f_2 + f_3, by_a, h * h * (TWELFTH * f_2 + 0.25 * f_3)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def of_state(sag, by_q, by_w, by_a, by_j):
-    """By p, v, a and j what is that by the state of a set (module text)."""
-    return by_q, by_w, by_a + sag * by_q, by_j + sag * by_w
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -127,89 +113,6 @@ def _weight(rows, i, r, per):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _tube_weights(sizes, group, rows, i, m, x, u, bent):
-    """Of the three rows of a set, the node, and the inner control points: the weights of n n', of the identity and, taken
-    off, of tt' with the leg's tangent t, as the nearest place moves along that; n.e and t.e of the inner ones."""
-    axes, z, per_s = len(sizes.axes), rows.z[i], rows.per_s[i]
-    h, row, sag = u[axes], 8 * axes + TUBE_NODE + 3 * m, group.sag[m]
-    pull = group.centre[i] if m == 0 else 0.0 * h
-    flat_0, flat_1, flat_2 = (
-        (z[row] + pull) * group.room_node[i],
-        z[row + 1] * group.room[i],
-        z[row + 2] * group.room[i],
-    )
-    s_0, s_1, s_2 = z[row] * per_s[row], z[row + 1] * per_s[row + 1], z[row + 2] * per_s[row + 2]
-    if bent:  # rows of two vectors are added by themselves
-        alone = where(group.bent[i] > 0.0, 0.0, 1.0 + 0.0 * h)
-        s_1, s_2 = s_1 * alone, s_2 * alone
-    long_0, long_1, long_2 = 0.0 * h, 0.0 * h, 0.0 * h  # |t|^2
-    n_1, n_2, t_1, t_2 = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h
-    for k in range(axes):
-        at_0, at_1 = (
-            tangent_of(sizes, group, rows, i, 3 * m, k),
-            tangent_of(sizes, group, rows, i, 3 * m + 1, k),
-        )
-        at_2 = tangent_of(sizes, group, rows, i, 3 * m + 2, k)
-        long_0, long_1, long_2 = long_0 + at_0 * at_0, long_1 + at_1 * at_1, long_2 + at_2 * at_2
-        w = x[axes + k] + sag * u[k]
-        e_1, e_2 = THIRD * w, THIRD * (2.0 * w + h * x[2 * axes + k])
-        n_1, n_2 = n_1 + rows.n[i, 3 * m + 1, k] * e_1, n_2 + rows.n[i, 3 * m + 2, k] * e_2
-        t_1, t_2 = t_1 + at_1 * e_1, t_2 + at_2 * e_2
-    one = 1.0 + 0.0 * h
-    slide_0 = flat_0 * rows.moves[i, 3 * m] / where(long_0 > 0.0, long_0, one)
-    slide_1 = flat_1 * rows.moves[i, 3 * m + 1] / where(long_1 > 0.0, long_1, one)
-    slide_2 = flat_2 * rows.moves[i, 3 * m + 2] / where(long_2 > 0.0, long_2, one)
-    return (s_0, s_1, s_2), (flat_0, flat_1, flat_2), (slide_0, slide_1, slide_2), (n_1, n_2), (t_1, t_2)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _tube_block(sizes, group, rows, i, m, weights, h, k, t):
-    """The second derivatives of a set's rows by axes k and t of p, v, a and j: pp, vp, ap, jp, vv, av, jv, aa, ja, jj."""
-    s, flat, slide, _, _ = weights
-    sag, c = group.sag[m], 3 * m
-    at_k, at_t = tangent_of(sizes, group, rows, i, c, k), tangent_of(sizes, group, rows, i, c, t)
-    g_0 = s[0] * rows.n[i, c, k] * rows.n[i, c, t] - slide[0] * at_k * at_t
-    at_k, at_t = tangent_of(sizes, group, rows, i, c + 1, k), tangent_of(sizes, group, rows, i, c + 1, t)
-    g_1 = s[1] * rows.n[i, c + 1, k] * rows.n[i, c + 1, t] - slide[1] * at_k * at_t
-    at_k, at_t = tangent_of(sizes, group, rows, i, c + 2, k), tangent_of(sizes, group, rows, i, c + 2, t)
-    g_2 = s[2] * rows.n[i, c + 2, k] * rows.n[i, c + 2, t] - slide[2] * at_k * at_t
-    if t == k:
-        g_0, g_1, g_2 = g_0 + flat[0], g_1 + flat[1], g_2 + flat[2]
-    third, sixth = THIRD * h, SIXTH * h * h
-    qq, wq, aq = g_0 + g_1 + g_2, third * (g_1 + 2.0 * g_2), sixth * g_2
-    ww, aw, aa = third * third * (g_1 + 4.0 * g_2), 2.0 * third * sixth * g_2, sixth * sixth * g_2
-    av = aw + sag * wq
-    return (
-        qq,
-        wq,
-        aq + sag * qq,
-        sag * wq,
-        ww,
-        av,
-        sag * ww,
-        aa + sag * (2.0 * aq + sag * qq),
-        sag * av,
-        sag * sag * ww,
-    )
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _tube_by_h(sizes, group, rows, i, m, weights, x, u, k):
-    """The second derivatives of a set's rows by h and axis k of p, v, a and j, and what that adds to the one by h."""
-    axes, sag, c = len(sizes.axes), group.sag[m], 3 * m
-    _, flat, slide, n_e, t_e = weights
-    s = weights[0]
-    h, w, none = u[axes], x[axes + k] + sag * u[k], 0.0 * u[axes]
-    e_1, e_2 = THIRD * w, THIRD * (2.0 * w + h * x[2 * axes + k])
-    f_1 = s[1] * n_e[0] * rows.n[i, c + 1, k] + flat[1] * e_1
-    f_1 -= slide[1] * t_e[0] * tangent_of(sizes, group, rows, i, c + 1, k)
-    f_2 = s[2] * n_e[1] * rows.n[i, c + 2, k] + flat[2] * e_2
-    f_2 -= slide[2] * t_e[1] * tangent_of(sizes, group, rows, i, c + 2, k)
-    by = of_state(sag, f_1 + f_2, THIRD * h * (f_1 + 2.0 * f_2), SIXTH * h * h * f_2, none)
-    return by, e_1 * f_1 + e_2 * f_2
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def put_model(sizes, group, rows, i, x, u, W, row):
     """W (4 A + 1, 4 A + 1), lower triangle, of the rows of step i with the node x (3 A,) and the controls u (A+1,); row
     (4 A + 1,) is overwritten."""
@@ -225,8 +128,8 @@ def put_model(sizes, group, rows, i, x, u, W, row):
     flat_1 = z[more + FEED_ROWS] * rows.per_radius[i, 0]
     flat_2 = z[more + FEED_ROWS + 1] * rows.per_radius[i, 1]
     flat_3 = z[more + FEED_ROWS + 2] * rows.per_radius[i, 2]
-    of_0 = _tube_weights(sizes, group, rows, i, 0, x, u, bent)
-    of_1 = _tube_weights(sizes, group, rows, i, 1, x, u, bent)
+    of_0 = tube_weights(sizes, group, rows, i, 0, x, u, bent)
+    of_1 = tube_weights(sizes, group, rows, i, 1, x, u, bent)
     y_1, y_2, y_3 = 0.0 * h, 0.0 * h, 0.0 * h  # products with e
     for k in range(axes):
         (v_1, v_2, v_3), (_, e_1, e_2, e_3) = of_axis(h, x[axes + k], x[2 * axes + k], u[k])
@@ -255,8 +158,8 @@ def put_model(sizes, group, rows, i, x, u, W, row):
                 vv, av = vv + box_mid, av + 0.5 * h * box_mid
                 aa, jj = aa + box_a + 0.25 * square * box_mid, jj + box_j
             b, d = (
-                _tube_block(sizes, group, rows, i, 0, of_0, h, k, t),
-                _tube_block(sizes, group, rows, i, 1, of_1, h, k, t),
+                tube_block(sizes, group, rows, i, 0, of_0, h, k, t),
+                tube_block(sizes, group, rows, i, 1, of_1, h, k, t),
             )
             pp, vp, ap, jp = b[0] + d[0], b[1] + d[1], b[2] + d[2], b[3] + d[3]
             vv, av, jv = vv + b[4] + d[4], av + b[5] + d[5], jv + b[6] + d[6]
@@ -271,8 +174,8 @@ def put_model(sizes, group, rows, i, x, u, W, row):
         f_mid, f_1 = box_mid * e_mid, s_1 * y_1 * v_1 + flat_1 * e_1
         f_2, f_3 = s_2 * y_2 * v_2 + flat_2 * e_2, s_3 * y_3 * v_3 + flat_3 * e_3
         by_v, by_a, by_j = spread(h, f_mid, f_1, f_2, f_3)
-        b, of_b = _tube_by_h(sizes, group, rows, i, 0, of_0, x, u, k)
-        d, of_d = _tube_by_h(sizes, group, rows, i, 1, of_1, x, u, k)
+        b, of_b = tube_by_h(sizes, group, rows, i, 0, of_0, x, u, k)
+        d, of_d = tube_by_h(sizes, group, rows, i, 1, of_1, x, u, k)
         total += e_mid * f_mid + e_1 * f_1 + e_2 * f_2 + e_3 * f_3 + of_b + of_d
         W[at, k], W[at, axes + k] = b[0] + d[0], by_v + b[1] + d[1]
         W[at, 2 * axes + k], W[at, 3 * axes + k] = by_a + b[2] + d[2], by_j + b[3] + d[3]

@@ -1,9 +1,9 @@
 """What the rows of a step (rows.py) push by in a Newton step, the sum of q grad g, and what they change by in it. Both go
-through the vectors of the rows (curvature.py).
+through the vectors of the rows (curvature.py, tube_curvature.py).
 """
 
 from planner.base.kernels import CONTRACT, njit
-from planner.joint.curvature import of_state, spread
+from planner.joint.curvature import spread
 from planner.joint.row_kinds import (
     ARC,
     FEED_NODE,
@@ -23,6 +23,7 @@ from planner.joint.row_kinds import (
     TWELFTH,
 )
 from planner.joint.rows import bent_at, of_axis, tangent_of, turn_of
+from planner.joint.tube_curvature import of_state
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)

@@ -73,7 +73,7 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether the search of a small job has not ended; behind filters the path is planned anyway."""
+    """Whether the search of a small job has not ended; behind long filters the path is planned anyway."""
     small = tried.left and is_searched(job, settings) and settings.effort.search.of(tried.steps).again
     return small and tried.best is None and not filters_count(*job.real)
 
@@ -94,7 +94,7 @@ def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether there is no plan yet, or the motion on the path takes less time, or may behind filters."""
+    """Whether there is no plan yet, or the motion on the path takes less time, or may behind long filters."""
     if filters_count(*job.real):
         return True
     if tried.path is None:

@@ -74,10 +74,6 @@ def _not_in_long_steps() -> None:
     joint_search.joint_plan = joint_plan
 
 
-def _never_alone(*_: Any, **__: Any) -> None:
-    return None
-
-
 # How each of `RETRIES` is switched off, by its first step.
 SWITCHES: dict[str, Switch] = {
     "search": _not_in_long_steps,

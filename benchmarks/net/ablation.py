@@ -26,7 +26,7 @@ from benchmarks.record import markdown, write_results
 from planner.base.threads import use_threads
 from planner.delivery import mending
 from planner.joint import guess, normal_rows, own, run
-from planner.planning import attempts, joint_search
+from planner.planning import attempts
 from planner.planning.attempt import Attempt
 from planner.planning.attempts import RETRIES
 from planner.planning.job import less_tolerance, runs_alone
@@ -62,21 +62,8 @@ def _no_corners(rounded: Any, best: Any, *more: Any) -> Any:
     return best, np.zeros(0, dtype=np.int64)
 
 
-def _not_in_long_steps() -> None:
-    inner = joint_search.joint_plan
-
-    def joint_plan(job: Any, settings: Any, planned: Any, search: Any, *more: Any, **named: Any) -> Any:
-        again = len(more) < 2 and not search.finer and settings.effort.search.finer
-        if again:
-            return joint_search.Joint(None, 0)
-        return inner(job, settings, planned, search, *more, **named)
-
-    joint_search.joint_plan = joint_plan
-
-
 # How each of `RETRIES` is switched off, by its first step.
 SWITCHES: dict[str, Switch] = {
-    "search": _not_in_long_steps,
     "search, once more": _no_attempt("search, once more"),
     "runs alone": _set(runs_alone, "VERDICTS", 0),
     "closed form": _no_attempt("closed form"),
@@ -115,8 +102,7 @@ def fires(name: str, row: Row) -> bool:
     if name in NUMBERS:
         return NUMBERS[name][0] in row.get("steps", {})
     steps = next(retry.steps for retry in RETRIES if retry.steps[0] == name)
-    least = 2 if name == "search" else 1  # one search is no retry
-    return sum(n for step, n in row.get("steps", {}).items() if step.startswith(steps)) >= least
+    return any(step.startswith(steps) for step in row.get("steps", {}))
 
 
 def chosen_jobs(net: dict[str, Row], name: str, most: int) -> list[str]:

@@ -161,7 +161,6 @@ class Retry(NamedTuple):
 # All that is tried once more. `python -m benchmarks.net.ablation ROWS --net NET --without STEP` plans without
 # it; worth as in benchmarks/results/ablation.md.
 RETRIES = (
-    Retry(("search",), "in long steps: shorter ones do not pass", "1", "never slower than `quick`"),
     Retry(
         ("search, once more",),
         "the search has not ended: from a motion that stays where it fails",
@@ -197,14 +196,8 @@ def _others(
     slower in places where that does not pass, and the motion on a path, `kept`."""
     from planner.planning.joint_search import Others
 
-    known: dict[tuple[int, int], Plan] = {}  # of a run, when the search begins once more in long steps
-
     def alone(run: Job) -> Plan:
-        blocks = int(run.toolpath.block[0]), int(run.toolpath.block[-1])
-        if blocks not in known:
-            made = best_of(attempts, run, settings)
-            known[blocks] = tolerant(run, made, partial(best_of, attempts, settings=settings))
-        return known[blocks]
+        return tolerant(run, best_of(attempts, run, settings), partial(best_of, attempts, settings=settings))
 
     return Others(alone, kept)
 

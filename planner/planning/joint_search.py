@@ -33,7 +33,6 @@ from planner.joint.splice import SplicedRun
 from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
 from planner.planning.job.by_run import RunsInTime, full_stops
-from planner.planning.job.choice import counted_time
 from planner.planning.job.job import Job
 from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
@@ -101,18 +100,16 @@ def joint_plan(
     search: Search,
     others: Others,
     motion: Motion | None = None,
-    start: Start | None = None,
 ) -> Joint:
-    """The plan of the joint search from a motion on a path; in long steps where shorter do not pass.
+    """The plan of the joint search from a motion on a path.
 
     search : how finely, and up to which size
     others : what there is where the search does not end, or the verdict finds something
     motion : that on the path with its limits kept: it stays where the search does not end; else None
-    start  : that of a search before, with what it found in long steps
     """
     stays = motion is not None
     with job.stage("search") as report:
-        start = start or Start(motion or planned.motion(), job, search.cut)
+        start = Start(motion or planned.motion(), job, search.cut)
         runs = list(tube_runs_of(job.toolpath, job.machine, jerk_limited=settings.order.jerk_limited))
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
         most = search.steps_max
@@ -137,12 +134,8 @@ def joint_plan(
     time = made.delivered.trajectory.cycle_time if made and not slower else np.nan
     count, kept = len(made.plans) if made else 0, made is not None and slower is None
     job.tell("search", found=time, before=start.motion.end, kept=kept, steps=steps, alone=count)
-    other = Joint(None, steps)
-    if not kept and search.of(steps).finer and not stays:
-        longer = dataclasses.replace(search, finer=())
-        other = joint_plan(job, settings, planned, longer, others, start=start)
     if made is None:
-        return other
+        return Joint(None, steps)
     start.forget()
     delivered = slower or made.delivered
     for k in (*made.plans, *made.stays):
@@ -150,7 +143,7 @@ def joint_plan(
         found[k] = FoundRun(found[k].run, Status.ACCEPTABLE, why)
     left = [k for k, one in enumerate(found) if one.steps is None]
     if len(left) == len(found) and not made.plans:  # the motion is the start's, which others deliver
-        return other
+        return Joint(None, steps)
     status, sentence = said(job, start, found, left, "", "a path first, then its feed")
     stayed = others.kept(job) if made.stays else (planned, motion) if motion else None
     held = history(stayed[0].problem, stayed[0].solution, *times_of_pieces(stayed[1])) if stayed else None
@@ -170,11 +163,7 @@ def joint_plan(
         tables=tables,
         notes=(*made.notes, *path_notes(job.toolpath, planned, _stays(job, found, made.plans)), *notes),
     )
-    if slower is None:
-        return Joint(plan, steps)
-    if counted_time(other.plan or other.slower) <= plan.cycle_time:
-        return other
-    return Joint(plan, steps) if other.plan else Joint(None, steps, slower=plan)
+    return Joint(plan, steps) if slower is None else Joint(None, steps, slower=plan)
 
 
 def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list[SplicedRun] | None:
@@ -260,8 +249,7 @@ def search_run(
 def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> Searching[tuple[Guess, TubeSolution]]:
     """The steps from which the last search began, and its solution."""
     guess = start.guess(k, run)
-    found = start.in_long_steps.get(k) or (yield from solver.first.search(run, guess))
-    start.in_long_steps[k] = found
+    found = yield from solver.first.search(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
         if not solver.finer:
             return guess, found

@@ -6,7 +6,6 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
-from planner.joint.outcome import TubeSolution
 from planner.joint.run import TubeRun
 from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
@@ -20,20 +19,17 @@ LEAST_APART = 1e-6
 class Start(RunsInTime):
     """A motion from which the search begins, and where in it the runs are.
 
-    cut           : how finely it is cut into steps
-    in_long_steps : what a first search found along each run, by its number
+    cut : how finely it is cut into steps
     """
 
     def __init__(self, motion: MotionInTime, job: Job, cut: Cut = DEFAULT_CUT):
         super().__init__(motion, job)
         self.cut = cut
         self._guesses: dict[int, Guess] = {}
-        self.in_long_steps: dict[int, TubeSolution] = {}
 
     def forget(self) -> None:
         """Let go of what only a search needs: half a kilobyte a step."""
         self._guesses.clear()
-        self.in_long_steps.clear()
         vars(self).pop("seen", None)
 
     def guess(self, k: int, run: TubeRun) -> Guess:

@@ -20,7 +20,7 @@ PACKAGE = Path(planner.__file__).parent
 MILL = planner.load_machine("mill")
 CORNERS = "G21 G90 G64 P0.05 F3000\nG1 X5\nX6 Y3\nX2 Y4\nM2\n"
 # What a trace shows of a plan that passes at its first attempt, and what only tells of something.
-WAY = ("programmed feed", "solve", "final grid", "between points", "plan", "given up")
+WAY = ("programmed feed", "search", "solve", "final grid", "between points", "plan", "given up")
 TOLD = ("bound on corners", "compare")
 
 
@@ -73,7 +73,7 @@ def test_where_the_search_cannot_run_the_next_attempts_do_in_their_order() -> No
 
 
 def test_an_attempt_that_makes_no_plan_leaves_it_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search finds nothing, nor in long steps: then from a motion that would stay, and then that is delivered."""
+    """The search finds nothing: then from a motion that would stay, and then that is delivered."""
     from planner.planning import joint_search
 
     def nothing(runs, *more, **named):
@@ -83,7 +83,7 @@ def test_an_attempt_that_makes_no_plan_leaves_it_to_the_next(monkeypatch: pytest
     names = [attempt.name for attempt in ATTEMPTS]
     steps = steps_of(CORNERS)
     assert [name for name in steps if name in names] == names
-    assert steps.count("search") == 3
+    assert steps.count("search") == 2
 
 
 def test_a_finished_plan_has_its_prices_and_nothing_that_only_planning_needs() -> None:

@@ -29,6 +29,7 @@ _MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per
 # (inverse_time_rate_straight).
 LINUXCNC_SLOWEST = 0.1
 # Ten times M codes: the one that reads an input, and the words that each needs.
+_DWELL = 40  # G4, whose S is a time where it has no other
 _READ_INPUT = 660
 _NEEDED = {620: "P", 630: "P", 640: "P", 650: "P", _READ_INPUT: "", 670: "EQ", 680: "EQ"}
 # By ten times the G code.
@@ -154,7 +155,7 @@ def feed_of_time(state: State, block: Block, length: float, findings: Findings) 
 def events(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """Keep S, T and the codes that a control passes on, and what they set. Raises WordFault."""
     line = block.line
-    if "S" in block.value:
+    if "S" in block.value and (block.g.get("one-shot") != _DWELL or block.has("PXU")):
         if block.value["S"] < 0:
             raise block.fault("a spindle speed must not be negative; write M4 to turn the other way", "S")
         table.add_event("S", block.value["S"], line)

@@ -34,8 +34,8 @@ _KEY = re.compile(r"([A-Za-z]\w*)\s*=\s*(\"[^\"]*\"|\S*)")
 _LETTER = re.compile(r"([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+)|)")
 # G codes that are read as in any program, by number; of the others those that level, wipe, park or probe.
 _ANY = frozenset((0, 1, 2, 3, 4, 5, 10, 11, 17, 18, 19, 20, 21, *range(52, 60), 90, 91, 92, 93, 94))
-_LEVELS = frozenset(
-    (12, *range(26, 36), 39, 42, 76, *range(80, 90), 130, 150, 212, 280, 375, 380, 383, 392, 425, 9111)
+_LEVELS = frozenset(  # G0 and G1 of RepRapFirmware with H, which end at a switch, among them
+    (0, 1, 12, *range(26, 36), 39, 42, 76, *range(80, 90), 130, 150, 212, 280, 375, 380, 383, 392, 425, 9111)
 )
 _STOPPING = {"M0": 0, "M1": 10, "M2": 20, "M30": 300}
 _HOMING = ("G28", "G161", "G162")
@@ -56,7 +56,11 @@ _NAMES = {
     settings.PRINTER_M: r"@.+|SET_\w+|EXCLUDE_OBJECT\w*|RESPOND|_?TIMELAPSE_\w+|SAVE_\w+|CLEAR_PAUSE|ENABLE_\w+|(QUERY|GET|DUMP|STATUS"
     r"|SDCARD|UPDATE|START_PRINT_TIMER|PRINT_STATS)_\w+|TURN_OFF_HEATERS|SYNC_EXTRUDER_MOTION|MMU_\w*STATS|ACTION_\w+",
 }
-_MEANT = dict.fromkeys((98, 401, 402), settings.LEVELLING) | {290: settings.SCALE_M}
+_MEANT = {
+    **dict.fromkeys((98, 401, 402), settings.LEVELLING),
+    **dict.fromkeys((25, 226, 601), settings.PARKS),
+    290: settings.SCALE_M,
+}
 _REFUSED = ("FORCE_MOVE", "MANUAL_STEPPER")
 _CALLS = (96, 97, 98, 198)
 
@@ -70,7 +74,7 @@ class Command(NamedTuple):
     @property
     def extended(self) -> bool:
         """True for a name, not a code."""
-        return not self.name[1:2].isdigit() and len(self.name) > 1
+        return len(self.name) > 1 and re.match(r"[GMTP][-\d]", self.name) is None
 
     def values(self) -> dict[str, str]:
         """Values by key, in small letters: of KEY=VALUE, or of letters."""
@@ -123,14 +127,14 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
     if found is None or found.name in _REFUSED:
         return False
     name, values = found.name, found.values()
-    code = int(name[1:].partition(".")[0]) if name[1:2].isdigit() else -1
+    code = -1 if found.extended or len(name) == 1 else int(name[1:].partition(".")[0])
     limits = name == settings.VELOCITY_LIMIT or (name == f"M{code}" and code in settings.SETS_LIMITS)
     given = {key: _number(value) for key, value in values.items()}
     if limits or name in OF_STATE:
         block.settings.append(
             settings.Setting(name, given, word, values.get("name" if found.extended else "s", ""))
         )
-    elif name[0] == "G" and code in _ANY:
+    elif name[0] == "G" and code in _ANY and not given.get("h"):
         return False
     elif ignored.ignores(name):
         ignored.count(settings.LEFT_OUT_BY_USER, name, block.line)

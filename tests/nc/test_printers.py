@@ -134,3 +134,30 @@ def test_codes_that_mills_have_too_do_not_make_a_printer(code: str) -> None:
 def test_codes_that_only_printers_have_make_one_wherever_they_stand(code: str) -> None:
     for text in (f"{code}\nG4 P2000\nG1 X5 F600\n", f"G4 P2000\nG1 X5 F600\n{code}\n"):
         assert parse_program("G21\n" + text).dwell.sum() == 2.0
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("@2L", "messages"),
+        ("@7", "messages"),
+        ("G1 H1 X-200 F3000", "levels, wipes or probes"),
+        ("M25", "parks the head"),
+        ("M226", "parks the head"),
+        ("M601", "parks the head"),
+    ],
+)
+def test_commands_that_are_no_moves(line: str, said: str) -> None:
+    """Names with a digit in front; moves of RepRapFirmware to a switch; pauses."""
+    program = parse_program(f"G21 F600\nM83\nG1 X5\n{line}\nG1 X10\n")
+    assert any(said in note for note in program.notes)
+    assert program.end[:, 0].tolist() == ([5.0, 5.0, 10.0] if "head" in said or "levels" in said else [5, 10])
+    assert (program.kind == Kind.STOP).sum() == len(program) - 2
+
+
+def test_the_seconds_of_a_dwell_are_no_speed() -> None:
+    program = parse_program("G21 F600\nM83\nM106 S255\nG1 X5\nG4 S2\nG1 X10\n")
+    assert program.dwell.tolist() == [0.0, 2.0, 0.0]
+    assert not [event for event in program.events if event.text[0] == "S"]
+    spoken = parse_program("G21 F600\nG1 X5\nG4 P2 S900\nG1 X10\n")
+    assert [event.text for event in spoken.events] == ["S900"]

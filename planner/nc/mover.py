@@ -12,7 +12,7 @@ from planner.nc.faults import Findings, IgnoredWords
 from planner.nc.moves import OFFSET_NUMBER, Block, WordFault, integer
 from planner.nc.program import Kind
 from planner.nc.splines import SplineReader, is_spline_line
-from planner.nc.state import NO_MOTION, REFUSED_MOTION, SYSTEMS, State
+from planner.nc.state import NO_MOTION, REFUSED_MOTION, SYSTEMS, State, tool_name
 
 # Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and
 # which are refused.
@@ -92,7 +92,7 @@ def _diameter(state: State, block: Block, code: int, findings: Findings) -> floa
     number = integer(block, "D", 0) if "D" in block.value else state.tool_loaded
     tool = state.tools.get(number)
     if tool is None or tool.diameter == 0.0:
-        text = f"tool {number} has no diameter in the machine file: {name} does not move the path"
+        text = f"{tool_name(number)} has no diameter in the machine file: {name} does not move the path"
         findings.assume(text, block.line, block.at["cutter compensation"], grave=True)
     return 0.0 if tool is None else tool.diameter
 

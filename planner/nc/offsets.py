@@ -23,7 +23,16 @@ from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.faults import Findings
 from planner.nc.moves import Block, WordFault, coordinate, integer
-from planner.nc.state import FURTHER_MAX, FURTHER_SYSTEMS, SYSTEMS, State, System, Tool, system_name
+from planner.nc.state import (
+    FURTHER_MAX,
+    FURTHER_SYSTEMS,
+    SYSTEMS,
+    State,
+    System,
+    Tool,
+    system_name,
+    tool_name,
+)
 
 _OF_HAAS, _G154 = 1100, 1540  # G110, the first of G110 to G129, which are G154 P1 to P20; and G154
 _DATA = (3, 50, 52)  # tool life, parameters of the control; to G11
@@ -211,7 +220,7 @@ def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> Flo
 
 def _offset_of(state: State, number: int, block: Block, findings: Findings) -> FloatArray:
     if number not in state.tools and number != 0:
-        text = f"tool {number} has no length in the machine file: 0"
+        text = f"{tool_name(number)} has no length in the machine file: 0"
         findings.assume(text, block.line, block.at["tool length"])
     return state.tools[number].offset.copy() if number in state.tools else state.zeros()
 

@@ -30,6 +30,7 @@ _HOMES = {"g28": 280, "g30": 300}  # codes of positions by their names in a mach
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}  # cosine and sine, exact
 FURTHER_SYSTEMS = 54_100  # and P: the further work systems of Fanuc, G54.1 P1 to P300
 FURTHER_MAX = 300
+NAMED = 100_000  # number of the first tool, and of the first label, that has a name instead
 FeedMode = Literal["per minute", "inverse time", "per turn"]
 LETTERS = "ABCUVW"  # of axes beside x, y and z
 DEGREES = "ABC"  # of rotary axes, whose places are in degrees
@@ -51,6 +52,12 @@ class Tool:
 
     offset: FloatArray
     diameter: float = 0.0
+
+
+def tool_name(number: int) -> str:
+    """What messages call a tool."""
+    named = "a tool with a name (write its number)"
+    return named if number >= NAMED else f"tool {number}"
 
 
 @dataclass(frozen=True)
@@ -143,6 +150,7 @@ class State:
     fanuc: bool = False  # G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
     entering: bool = False  # lines up to G11 are data of the control (G10 L50)
     seconds_meant: bool = False  # the unit of dwells is known
+    centres_known: bool = False  # the dialect has no G90.1
     plane_known: bool = True  # G17, G18 or G19 was read, or the control starts with G17
 
     @property

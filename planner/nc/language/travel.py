@@ -9,6 +9,7 @@ from planner.base.arrays import FloatArray
 from planner.nc.language.approach import Approach, ContourWay
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
 from planner.nc.language.rows_through import RowsThrough
+from planner.nc.state import tool_name
 
 
 class Travel(RowsThrough):
@@ -87,9 +88,9 @@ class Travel(RowsThrough):
         """Radius of the tool that compensates [mm]; where it is 0 that is said."""
         radius = self.radius()
         if radius == 0.0:
-            number = self.interpreter.state.tool_loaded
+            tool = tool_name(self.interpreter.state.tool_loaded)
             text = "has no diameter in the machine file: radius compensation does not move the path"
-            assume(f"tool {number} {text}")
+            assume(f"{tool} {text}")
         return radius
 
     def approach(self, way: ContourWay, first: FloatArray, side: int, assume: Callable[[str], None]) -> None:

@@ -11,12 +11,13 @@ from planner.base.units import MM_PER_INCH
 from planner.nc.codes import M_GROUP
 from planner.nc.language import tree
 from planner.nc.language.heidenhain import cycles, moves, tables, text
-from planner.nc.language.heidenhain.flow import NAMED, Flow
+from planner.nc.language.heidenhain.flow import Flow
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.making import Making, assumed_row
 from planner.nc.language.source import Source
 from planner.nc.language.tree import ZERO, Line, Return, row, word
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON, UNKNOWN_M, setting
+from planner.nc.state import NAMED
 
 _VALUE = r"\s*(?:[-+]?\s*(?:\d+\.?\d*|\.\d+|Q[LR]?\d+))"
 _LENGTHS, _OVERSIZE = r"\s*(L|R)(?=[-+.\dQ\s])", r"\s*(DL|DR2|DR):?(?=[-+.\dQ\s])"

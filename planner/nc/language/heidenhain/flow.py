@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from planner.nc.language import makers, tree
 from planner.nc.language.heidenhain.text import Block, Formula, Rows, variable
 from planner.nc.language.making import assumed_row
+from planner.nc.state import NAMED
 
 _COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
 # FN functions by their numbers: comparisons, and operations on two values and on one.
@@ -20,7 +21,6 @@ FN_REFUSED = {
     28: _CONTROLS,
     17: "it writes data of the control; leave it out, if these move nothing",
 }
-NAMED = 100_000  # number of the first label, and of the first tool, with a name
 
 
 class Flow:

@@ -170,3 +170,9 @@ def test_rotary_axes_go_the_shortest_way_under_m126() -> None:
 def test_what_is_refused_says_what_it_would_do(body: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read(body)
+
+
+def test_a_tool_with_a_name_is_called_so() -> None:
+    said = read('1 TOOL CALL "MILL" Z S100\n2 L X+0 Y+0 FMAX\n3 L X+9 RL F100\n4 L Y+9').assumptions
+    assert any("a tool with a name (write its number) has no diameter" in one for one in said)
+    assert not any("tool 100000" in one for one in said)

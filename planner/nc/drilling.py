@@ -275,7 +275,8 @@ def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
 
 def _meaning(letter: str) -> str:
     what = {"R": "R, where its feed begins", "P": "P, its dwell in seconds", "Q": "Q, the depth of a peck"}
-    return what.get(letter, f"its depth as {letter}" if letter in "XYZ" else f"{letter}: the offsets I J K")
+    offsets = f"{letter}: the offsets I J K, for Fanuc's Q goes where a parameter of the control says"
+    return what.get(letter, f"its depth as {letter}" if letter in "XYZ" else offsets)
 
 
 def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:

@@ -83,6 +83,7 @@ class Interpreter:
         self.limits = LimitsInForce()
         self.saved = SavedStates()
         self.ended = False  # M2, M30 or a second % was executed; later chunks are not
+        self.archive: dict[str, bytes] = {}  # further programs of the file, by the names of their own
         self.two_axes = False  # the program has X and Z and no Y, and was not found to be one for a lathe
         self.by_word = 0  # rows that were executed word by word, not by the compiled loop
         self._timed = False  # a feed is in inverse time

@@ -85,7 +85,7 @@ def unused(letter: str) -> str:
     """The message for a word that no code of its block uses."""
     if letter in codes.LETTERS_REFUSED:
         return str(codes.LETTERS_REFUSED[letter])
-    return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; remove it"
+    return f"{letter} word without {codes.LETTER_NEEDS[letter]}, which would use it; write its moves out"
 
 
 class ArcFault(WordFault):
@@ -257,7 +257,7 @@ def _remedy(state: State, block: Block, end: FloatArray, normal: int) -> str:
     """What to do about an arc that does not close: many programs have absolute centres and do not say so."""
     try:
         other = _centre(state, block, absolute=not state.absolute_centre)
-        if arcs.not_closed(state.position, end, other, normal, state.unit):
+        if state.centres_known or arcs.not_closed(state.position, end, other, normal, state.unit):
             raise arcs.ArcError
     except arcs.ArcError:
         return "correct the centre or the end point"

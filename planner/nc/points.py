@@ -22,6 +22,7 @@ from planner.nc.program import Kind, PathControl, Program, SplineTable
 AXES = ("x", "y", "z")
 SOURCE, CURVE = "<points>", "NURBS"  # what messages call programs of points and of curves
 UNIT_WORD = re.compile(rb"^[^(;\n]*?[Gg](20|21)\b", re.MULTILINE)  # the first of each line of an NC text
+_G_CODE = re.compile(rb'^[ \t]*(?:N\d+[ \t]*)?[GM]\d|^\{"?gc"?:', re.MULTILINE | re.IGNORECASE)
 _FORMAT = "points"
 _CURVES = tuple(field.name for field in dataclasses.fields(SplineTable))
 
@@ -80,8 +81,8 @@ def is_points(program: Program) -> bool:
 
 
 def are_points(data: bytes) -> bool:
-    """True if a file holds points: no NC program begins with a brace."""
-    return data[:64].lstrip().startswith(b"{")
+    """True if a file holds points; one of TinyG's lines may begin with a brace, too."""
+    return data[:64].lstrip().startswith(b"{") and (b'"points"' in data or not _G_CODE.search(data))
 
 
 def own_text(program: Program) -> bytes | None:

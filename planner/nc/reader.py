@@ -41,6 +41,8 @@ from planner.nc.reading import (
 
 _WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program begins, and hardly a file name
 
+_G20, _G70 = 20.0, 70.0
+
 
 def read_program(
     path: str | Path | None = None,
@@ -137,6 +139,9 @@ def execute(
     data = reading.kept(data, source)
     for first, last in reading.lines:
         interpreter.findings.assume(f"lines {first} to {last} are left out, as --ignore says", first)
+    interpreter.archive = detect.programs_of(data)
+    mains = (text for name, text in interpreter.archive.items() if name.endswith("mpf"))
+    data = next(mains, data)
     called = rewritten(data, machine, reading, source)
     if called is not None and called.dialect == CL:
         reading = dataclasses.replace(reading, dialect=LINUXCNC)
@@ -144,7 +149,7 @@ def execute(
     if language == HEIDENHAIN:
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
-        interpreter.state.seconds_meant = True
+        interpreter.state.seconds_meant = interpreter.state.centres_known = True
         return interpreter, *expand(interpreter, text_alone(data), HEIDENHAIN, integers_of(machine), tee)
     if language != SIEMENS:
         data, leader = detect.without_leader(data, reading)
@@ -155,12 +160,18 @@ def execute(
         words = dataclasses.replace(words, line=called.line[words.line - 1], files=called.files)
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
-    mark = detect.siemens_mark(words, source) if reading.dialect == AUTO else ""
+    mark = ""
+    if reading.dialect == AUTO:
+        mark = "its %_N_" if interpreter.archive else detect.siemens_mark(words, source)
     language = SIEMENS if mark else language
     calls = called is not None and called.dialect == KLIPPER
     prints = calls or (language != SIEMENS and not reading.strict and is_printer(words))
     if prints:
         interpreter.ignored.read_printer()
+    if language != SIEMENS and not reading.strict and (units := detect.units(words)):
+        text = "G70 and G71 without the words of a cycle are inch and mm, as in ISO 6983 and Mach3"
+        interpreter.findings.assume(text, int(words.line[words.row(units[0])]))
+        words.value[units] += _G20 - _G70
     dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading, prints=prints)
     if not prints and detect.is_turned(words, dialect, reading, machine):
         dialect = LATHE
@@ -170,6 +181,7 @@ def execute(
     interpreter.state.fanuc = (
         reading.dialect == FANUC or dialect in (FANUC, LATHE) or detect.is_fanuc(words, dialect, reading)
     )
+    interpreter.state.centres_known = dialect == SIEMENS
     interpreter.state.plane_known = not interpreter.state.fanuc or dialect == LATHE
     interpreter.state.seconds_meant = reading.dialect != AUTO or dialect == SIEMENS or interpreter.state.fanuc
     integers = integers_of(machine)

@@ -72,7 +72,12 @@ REFUSED = [
     ("G" + "9" * 400, 1, 1, ["does not know"]),
     ("M-3", 1, 1, ["M-3", "does not know"]),
     *[
-        (f"G21\nG{codes.number(code)}", 2, 1, [f"G{codes.number(code)}", refusal.what, refusal.remedy])
+        (
+            f"G21\nG{codes.number(code)}" + " R1" * (code in (700, 710)),  # alone they are units
+            2,
+            1,
+            [f"G{codes.number(code)}", refusal.what, refusal.remedy],
+        )
         for code, refusal in codes.G_REFUSED.items()
         if setting("G", code, "", "") is None
     ],

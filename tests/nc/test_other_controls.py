@@ -73,6 +73,40 @@ def test_tinyg_has_g_code_in_json(text: str) -> None:
     assert same(parse_program(retimed((HEAD + text + TAIL).encode(), program, program.feed)), program)
 
 
+def test_a_program_that_begins_with_json_is_no_file_of_points() -> None:
+    text = '{"sr":{"line":true}}\n{"gc":"g21 g90"}\nG1 X10 F600\n{"gc":"g1 y5"}\n'
+    assert parse_program(text).end.tolist() == [[10.0, 0.0, 0.0], [10.0, 5.0, 0.0]]
+
+
+def test_g70_and_g71_without_a_cycle_are_units() -> None:
+    program = parse_program("N10 G90 F600\nN20 G71 G17\nG0 X1\nG70\nX2\nG1 Y1 F10\n")
+    assert program.end.tolist() == [[1.0, 0.0, 0.0], [50.8, 0.0, 0.0], [50.8, 25.4, 0.0]]
+    assert program.feed[-1] * 60.0 == pytest.approx(254.0)
+    assert any("line 2: G70 and G71" in said for said in program.assumptions)
+    with pytest.raises(InputError, match="no profile from N10"):
+        parse_program("G71 P10 Q20\n")
+
+
+# Programs of other controls with words that a Sinumerik has, and what is said of them.
+NO_SINUMERIK = {
+    "O1000\nG15 H1\nCALL O200 Q2 LX=5\nX=LX\nM2\n": "Okuma",
+    "#1 = 3\nif [#1 > 2]\nG1 X1 F100\nendif\nM30\n": "'>' comes",
+}
+
+
+@pytest.mark.parametrize("text", NO_SINUMERIK)
+def test_no_sinumerik(text: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_program(text)
+    assert NO_SINUMERIK[text] in str(caught.value)
+    assert "Sinumerik" not in str(caught.value)
+
+
+def test_unused_words_are_not_to_be_left_out() -> None:
+    with pytest.raises(InputError, match=r"P word without .*; write its moves out"):
+        between("G41 P2 X20 Y20")
+
+
 # Lines that are refused by name: their column, and a part of what is said.
 REFUSED = [
     ("$J=G91 X5 F100", 1, "may move"), ("$TPW", 1, "$TPW: this command"), ("$F=part.nc", 1, "may move"),

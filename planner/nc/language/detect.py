@@ -39,7 +39,13 @@ _SIEMENS = re.compile(
     r"UPATH|SPATH|ENDIF|ENDWHILE|ENDLOOP|ENDFOR|MCALL|[BAC]SPLINE|UNTIL|LOOP|INVCW|INVCCW|M17|RET)\b)",
     re.IGNORECASE,
 )
+# Marks of programs that are none of a Sinumerik's: a parameter, commands of Okuma's.
+_OF_ANOTHER = re.compile(
+    r"[^(;]*?#|\s*(?:N\w+\s+)?(?:CALL\s+O\d|(?:MODIN|MODOUT|NOEX|NLAP|RTS)\b)", re.IGNORECASE
+)
 _SIEMENS_CODES = (331, 332, 500, *range(505, 600), 601, 602, 603, 621, *range(641, 646), 700, 710)
+_PROGRAM_HEAD = re.compile(rb"^%_N_(\w+)_(MPF|SPF)\b", re.MULTILINE)
+_BESIDE_UNITS = frozenset(b"NGMS")  # letters of a line in which G70 and G71 are no cycles
 _SUBPROGRAMS = (".mpf", ".spf")
 # A plotter file starts with one of these instructions and a number, the end of the instruction or the next
 # one. No word of an NC program is a letter followed by a letter. (A semicolon before it may start a comment
@@ -111,6 +117,24 @@ _LANGUAGE = re.compile(rb"[#\[<=]")
 _DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
 
 
+def programs_of(data: bytes) -> dict[str, bytes]:
+    """The programs of a Sinumerik's archive by the names of their files, in small letters, with blanks for all
+    others; {} for a file of one program."""
+    heads = list(_PROGRAM_HEAD.finditer(data)) if data.count(b"%_N_") > 1 else []
+    found: dict[str, bytes] = {}
+    for head, behind in zip(heads, [*heads[1:], None], strict=True) if heads else ():
+        begin, end = head.end(), len(data) if behind is None else behind.start()
+        blank = (re.sub(rb"[^\r\n]", b" ", part) for part in (data[:begin], data[end:]))
+        found[f"{head[1].decode()}.{head[2].decode()}".lower()] = data[begin:end].join(blank)
+    return found
+
+
+def units(words: Words) -> list[int]:
+    """The words G70 and G71 that no word of a cycle stands beside: inch and mm, as G20 and G21."""
+    found = words.find("G", 70.0, 71.0).tolist()
+    return [word for word in found if set(words.of_rows(words.row(word))[0].tolist()) <= _BESIDE_UNITS]
+
+
 def refuse_models(data: bytes, source: str) -> None:
     """Raise InputError for drawings, models, settings: files that people have beside their programs."""
     head = data[:_LOOKED_AT]
@@ -156,7 +180,9 @@ def siemens_mark(words: Words, source: str) -> str:
     )
     marked = (row for row in odd if _SIEMENS.match(words.row_text(row)))
     first = next(marked, None)
-    return "" if first is None else f"line {words.line[first]}, {words.row_text(first).strip()[:_SHOWN]!r}"
+    if first is None or any(_OF_ANOTHER.match(words.row_text(row)) for row in odd):
+        return ""
+    return f"line {words.line[first]}, {words.row_text(first).strip()[:_SHOWN]!r}"
 
 
 def without_leader(data: bytes, reading: Reading) -> tuple[bytes, str]:

@@ -110,14 +110,16 @@ class _Files:
     def load(self, name: str) -> bool:
         """Read a subprogram in the program's folder or below; False for none. Raises ProgramFault."""
         program, wanted = Path(self.run.interpreter.source), self.dialect.files(name)
-        if not program.is_file() or not _CALLED.fullmatch(name):
+        path, archive = None, self.run.interpreter.archive
+        data = next((archive[file] for file in archive if file in wanted), None)
+        if data is None and program.is_file() and _CALLED.fullmatch(name):
+            found = (one for one in _below(program.parent) if one.name.lower() in wanted and one.is_file())
+            path = next((one for one in found if one.stat().st_size <= FILE_MAX), None)
+            data = None if path is None else path.read_bytes()
+        if data is None:
             return False
-        found = (path for path in _below(program.parent) if path.name.lower() in wanted and path.is_file())
-        path = next((path for path in found if path.stat().st_size <= FILE_MAX), None)
-        if path is None:
-            return False
-        words = split_words(path.read_bytes(), block_delete=self.run.interpreter.reading.block_delete)
-        faults = self.read(self.integers.applied(words), str(path))
+        words = split_words(data, block_delete=self.run.interpreter.reading.block_delete)
+        faults = self.read(self.integers.applied(words), str(path or program))
         if faults:
             raise faults[0]
         nameless = self.run.functions.pop("file", None)  # a subprogram that only its file names

@@ -89,10 +89,10 @@ class Declarations(SiemensControl):
         return found
 
     def _values(self, reader: LineTokens, count: int) -> list[tree.Expression]:
-        """The first values of an array: SET(a, b, ...), REP(a), or one for the first place."""
+        """The first values of an array: SET(a, b, ...), also without SET, REP(a), or one for the first place."""
         repeated = reader.peek() == "REP"
-        if repeated or reader.peek() == "SET":
-            reader.pop()
+        if repeated or reader.peek() in ("SET", "("):
+            reader.next += reader.peek() != "("
             given = [tree.ZERO if one is None else one for one in self._arguments(reader)]
         else:
             given = [reader.expression()]

@@ -104,8 +104,9 @@ REFUSED: dict[str, tuple[str, str]] = {
     "PUTFTOC": ("it changes tool offsets while the axes move", "leave it out"),
 }  # fmt: skip
 UNKNOWN = (
-    "there is no such subprogram in this program or its folder, and no such word is known: it may move the machine; if the "
-    'machine\'s builder made it and it moves nothing, name it under [dialect] of the machine file: subprograms = ["{0}"]'
+    "there is no such subprogram in this program or its folder, and no such word is known: it may move the machine; put its file "
+    "({0}.SPF or {0}.MPF) beside the program; if the machine's builder made it and it moves nothing, name it under [dialect] of "
+    'the machine file: subprograms = ["{0}"]'
 )
 
 

@@ -47,6 +47,12 @@ PLACES: dict[str, tuple[str, list[tuple[float, float, float]]]] = {
         "DEF REAL P[3]\nDEF INT I\nP[0]=1 P[1]=2.5\nP[2]=4\nFOR I=0 TO 2\nG1 X=P[I] F500\nENDFOR",
         [(1, 0, 0), (2.5, 0, 0), (4, 0, 0)],
     ),
+    "values of an array in brackets": ("DEF REAL P[3]=(1, 2.5, -R1)\nG1 X=P[1] Y=P[0] F500", [(2.5, 1, 0)]),
+    "an archive": (
+        "%_N_L1_SPF\nG91 G1 X1\nG90\nM17\n%_N_MAIN_MPF\nG0 X0 F500\nL1 P2\nAB(3)\nM30\n"
+        "%_N_AB_SPF\nPROC AB(REAL A)\nG1 Y=A\nRET",
+        [(0, 0, 0), (1, 0, 0), (2, 0, 0), (2, 3, 0)],
+    ),
     "SET of two dimensions": ("DEF REAL P[2,3]=SET(1,2,3,4,5,6)\nG1 X=P[1,2] Y=P[0,1] F500", [(6, 2, 0)]),
     "REP": ("DEF INT A[4]=REP(7)\nG1 X=A[3] F500", [(7, 0, 0)]),
     "polar": (
@@ -177,3 +183,20 @@ def test_a_tilted_plane_turns_the_axes_and_its_points_are_the_tips() -> None:
     # the tool's axis: the middle of the arc lies in the plane
     assert program.tool_point is not None
     assert program.tool_point.length == 20.0
+
+
+def test_places_in_an_archive_are_those_of_the_file() -> None:
+    text = "%_N_MAIN_MPF\nG0 X1\nAB\nM30\n%_N_AB_SPF\nG1 Y1 F100\nZ=MISSING\nRET\n"
+    with pytest.raises(InputError, match="MISSING is not declared") as caught:
+        read(text)
+    assert (caught.value.line, caught.value.column) == (7, 3)
+
+
+def test_the_remedy_of_an_arc_is_no_code_of_another_control() -> None:
+    with pytest.raises(InputError, match="correct the centre or the end point"):
+        read("G71 G0 X0 Y0\nG2 X10 Y0 I5 J=AC(0) F100\nG2 X30 Y0 I20 J0")
+
+
+def test_a_missing_subprogram_says_where_its_file_belongs() -> None:
+    with pytest.raises(InputError, match=r"put its file \(HOLE.SPF or HOLE.MPF\) beside the program"):
+        read('G71 G0 X=1\nEXTCALL("HOLE")')

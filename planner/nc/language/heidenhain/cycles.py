@@ -333,6 +333,14 @@ def raised(making: Making, given: Given) -> Iterator[Row]:
     _look(making)
 
 
+def freed(making: Making, given: Given) -> Iterator[Row]:
+    """The same, if the tool is below the surface."""
+    _look(making)
+    if making.shared["_z"] < parameters(making)["Q203"]:
+        yield from _up(making)
+        _look(making)
+
+
 PATTERNS: dict[int, Cycle] = {
     220: lambda making, given: _pattern(making, _on_circle, lambda q: q["Q241"]),
     221: lambda making, given: _pattern(making, _on_lines, lambda q: q["Q242"] * q["Q243"]),

@@ -12,7 +12,7 @@ from planner.nc.language.heidenhain import cycles, moves, patterns, text
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import called_file, files, procedure_name
 from planner.nc.language.makers import compensate, corner
-from planner.nc.language.making import assumed_row
+from planner.nc.language.making import Cycle, assumed_row
 from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source
 from planner.nc.language.system_variables import PositionVariables, position
@@ -233,7 +233,21 @@ class HeidenhainParser(Definitions):
         given = text.items(block)
         before, after, _ = self._codes(block, given)
         ends = {axis: end for axis, end in self._ends(block, given).items() if axis != "Z"}
-        return [*before, *self.moves.straight(block, given, ends), *self._call_cycle(block), *after]
+        shift = given.axes.get("Z", (tree.ZERO, False))[0]
+        return [*before, *self._at_place(block, given, ends, shift, cycles.freed), *after]
+
+    def _at_place(
+        self, block: text.Block, given: text.Items, ends: moves.Ends, shift: tree.Expression, up: Cycle
+    ) -> text.Rows:
+        """The cycle at a place, its surface (Q203) moved by a shift; `up` leads to the height of the way there."""
+        surface = text.parameter(203)
+        return [
+            tree.assign(block.place, (surface, surface + shift)),
+            tree.made(block.place, up),
+            *self.moves.straight(block, given, ends),
+            *self._call_cycle(block),
+            tree.assign(block.place, (surface, surface - shift)),
+        ]
 
     def _pattern(self, block: text.Block) -> text.Rows:
         self.places = patterns.places(block)
@@ -245,13 +259,8 @@ class HeidenhainParser(Definitions):
         if not self.places:
             raise block.fault("CYCL CALL PAT, and no PATTERN DEF before it; tables of points are not read")
         rows: text.Rows = [*before]
-        surface = text.parameter(203)
-        for place in self.places:
-            x, y, z = place
-            rows.append(tree.assign(block.place, (surface, surface + z)))
-            rows.append(tree.made(block.place, cycles.raised))
-            rows += self.moves.straight(block, text.Items(fast=True), {"X": x, "Y": y})
-            rows += [*self._call_cycle(block), tree.assign(block.place, (surface, surface - z))]
+        for x, y, z in self.places:
+            rows += self._at_place(block, text.Items(fast=True), {"X": x, "Y": y}, z, cycles.raised)
         return [*rows, tree.made(block.place, cycles.raised), text.looked_up(block), *after]
 
     def _tool_point(self, block: text.Block) -> text.Rows:

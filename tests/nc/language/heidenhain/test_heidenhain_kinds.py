@@ -176,3 +176,19 @@ def test_a_tool_with_a_name_is_called_so() -> None:
     said = read('1 TOOL CALL "MILL" Z S100\n2 L X+0 Y+0 FMAX\n3 L X+9 RL F100\n4 L Y+9').assumptions
     assert any("a tool with a name (write its number) has no diameter" in one for one in said)
     assert not any("tool 100000" in one for one in said)
+
+
+def test_z_of_a_called_place_shifts_the_surface() -> None:
+    """CYCL CALL POS: Z is added to Q203; from below the surface the tool goes up first."""
+    hole = "Q200=2 Q201=-10 Q206=150 Q202=10 Q203=1 Q204=20 Q211=0 Q210=0"
+    program = read(
+        f"1 L Z+50 FMAX\n2 CYCL DEF 200 {hole}\n3 CYCL CALL POS X+30 Y+10 Z+5 FMAX M3\n"
+        "4 CYCL CALL POS X+50 Y+10 Z+0 F3000\n5 L Z-5 F100\n6 CYCL CALL POS X+70 Y+10 Z-3 FMAX"
+    )
+    deepest = {x: program.end[program.end[:, 0] == x, 2].min() for x in (30.0, 70.0)}
+    assert deepest == {30.0: 1.0 + 5.0 - 10.0, 70.0: 1.0 - 3.0 - 10.0}
+    to_second = np.flatnonzero(program.line == 5)[0]
+    assert program.end[to_second].tolist() == [50.0, 10.0, 1.0 + 5.0 + 20.0]
+    assert program.feed[to_second] == pytest.approx(50.0)
+    last = program.end[program.line == 7].tolist()
+    assert last[:2] == [[50.0, 10.0, 1.0 - 3.0 + 20.0], [70.0, 10.0, 1.0 - 3.0 + 20.0]]

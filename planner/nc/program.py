@@ -244,9 +244,7 @@ class Program:
     text: bytes | None = None
 
     def __post_init__(self) -> None:
-        axes = len(self.axes)
-        blocks = len(self.kind)
-        arcs = len(self.arc_block)
+        axes, blocks, arcs = len(self.axes), len(self.kind), len(self.arc_block)
         freeze(self, "start", np.float64, (axes,))
         freeze(self, "kind path_control", np.uint8, (blocks,))
         freeze(self, "end", np.float64, (blocks, axes))

@@ -26,6 +26,7 @@ import cmath
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -326,21 +327,15 @@ def _on_lines(given: Given, n: int) -> complex:
     return complex(given["Q225"], given["Q226"]) + place * cmath.rect(1.0, angle)
 
 
-def raised(making: Making, given: Given) -> Iterator[Row]:
-    """Up to the height between places, with where the tool is now."""
+def raised(making: Making, given: Given, *, always: bool = True) -> Iterator[Row]:
+    """Up to the height between places, else from below the surface alone, with where the tool is now."""
     _look(making)
-    yield from _up(making)
-    _look(making)
-
-
-def freed(making: Making, given: Given) -> Iterator[Row]:
-    """The same, if the tool is below the surface."""
-    _look(making)
-    if making.shared["_z"] < parameters(making)["Q203"]:
+    if always or making.shared["_z"] < parameters(making)["Q203"]:
         yield from _up(making)
         _look(making)
 
 
+freed = partial(raised, always=False)
 PATTERNS: dict[int, Cycle] = {
     220: lambda making, given: _pattern(making, _on_circle, lambda q: q["Q241"]),
     221: lambda making, given: _pattern(making, _on_lines, lambda q: q["Q242"] * q["Q243"]),

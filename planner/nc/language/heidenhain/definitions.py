@@ -29,7 +29,10 @@ _TOOL_CALL = (
 READ = (*cycles.CYCLES, *cycles.PATTERNS)
 _OLD_PECKING = (200, 201, 202, 211, 206)  # Q parameters that the lines 1.1 to 1.5 of cycle 1 give
 # Q parameters that are read where they are 0 only.
+_TIP = "is by the angle of the tip, of the control's tool table; write 0, and the depth of the tip as Q201"
 _REFUSED = {
+    343: f"Q343 1, a depth by the diameter Q344, {_TIP}",
+    395: f"Q395 1, a depth of the full diameter, {_TIP}",
     365: "Q365 1, moves between the places on the circle, is not read; write 0",
     439: "Q439, another reference of the feed, is not read; write 0",
 }

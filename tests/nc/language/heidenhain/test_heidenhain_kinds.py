@@ -192,3 +192,13 @@ def test_z_of_a_called_place_shifts_the_surface() -> None:
     assert program.feed[to_second] == pytest.approx(50.0)
     last = program.end[program.line == 7].tolist()
     assert last[:2] == [[50.0, 10.0, 1.0 - 3.0 + 20.0], [70.0, 10.0, 1.0 - 3.0 + 20.0]]
+
+
+@pytest.mark.parametrize("q", ["Q343=+1 Q344=-8", "Q395=1"])
+def test_depths_by_the_tip_of_the_tool_are_refused(q: str) -> None:
+    cycle = f"1 CYCL DEF {240 if '344' in q else 200} Q200=2 Q201=-5 Q206=100 Q202=5 Q203=0 Q204=9"
+    call = "\n2 L X+1 FMAX M99"
+    with pytest.raises(InputError, match=r"the angle of the tip, .* write 0, and the depth") as caught:
+        read(f"{cycle} {q}{call}")
+    assert (caught.value.line, caught.value.column) == (2, len(cycle) + 2)
+    assert read(f"{cycle} {q.replace('=+1', '=0').replace('=1', '=0')}{call}").end[:, 2].min() == -5.0

@@ -2,6 +2,7 @@
 M98, M99, G65, G66)."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
@@ -110,14 +111,21 @@ def of_block(
     return number, [*_row(rest, line), call]
 
 
-def returned(words: tree.Words, line: SourceLine, *, restarts: bool) -> list[tree.Statement]:
-    """M99. restarts : it stands in the main program, which a control then starts again."""
+def returned(
+    words: tree.Words, line: SourceLine, before: Sequence[tree.Statement], *, restarts: bool
+) -> list[tree.Statement]:
+    """M99. restarts : it stands in the main program, whose statements so far are `before`: a control starts it
+    again, or goes to the block P."""
     rest, given = _split(words, "M99", "P")
     statements = _row(rest, line)
+    to = given.get("P")
+    back = [tree.Number(float(one.number)) for one in before if isinstance(one, tree.Label)]
+    if restarts and to is not None and to not in back:
+        return [*statements, tree.Goto(line.place, to)]
     if restarts:
         text = "M99 starts the main program again; it is read once"
         statements.append(tree.Message(line.place, (text,)))
-    return [*statements, tree.Return(line.place, None, given.get("P"))]
+    return [*statements, tree.Return(line.place, None, to)]
 
 
 def macro(words: tree.Words, code: str, line: SourceLine) -> tree.Call:

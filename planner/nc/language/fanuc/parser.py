@@ -234,7 +234,8 @@ class FanucParser(FanucControl):
             self.local.append((number, line.place, program))
             self.body += statements
         elif code == "M99":
-            self.body += calls.returned(words, line, restarts=program.name == "" and not self.calls_blocks)
+            restarts = program.name == "" and not self.calls_blocks
+            self.body += calls.returned(words, line, self.base, restarts=restarts)
         elif code == "G65":
             self.body.append(calls.macro(words, "G65", line))
         else:

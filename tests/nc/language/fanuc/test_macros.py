@@ -25,6 +25,8 @@ FANUC = {
     "m98 with its count": ("G1 X1\nM98 P30200\nM30\nO0200\nG91 X2\nG90\nM99", "G1 X1\nX3\nX5\nX7"),
     "m98 beside a move": ("G1 X1 M98 P200\nM30\nO200\nG1 Y1\nM99", "G1 X1\nY1"),
     "m99 to a block": ("G1 X1\nM98 P200\nX99\nN50 X2\nM30\nO200\nY1\nM99 P50", "G1 X1\nY1\nX2"),
+    "m99 of the main program to a block": ("G1 X1\nM99 P50\nX99\nN50 X2\nM30", "G1 X1\nX2"),
+    "m99 of the main program to one before": ("G1 X1\nN50 X2\nM99 P50\nX99\nM30", "G1 X1\nX2"),
     "m97": ("G1 X1\nM97 P100 L2\nX0\nM30\nN100 G91 Y1\nG90\nM99", "G1 X1\nY1\nY2\nX0"),
     "g65": ("#1=7\nG65 P300 A1.5 B2 I3 J4 K5 I6\nG1 X#1\nM30\nO300\nG1 X#1 Y#2 Z[#4+#5+#6+#7]\n#1=50\nM99", "G1 X1.5 Y2 Z18\nX7"),
     "g65 in g65": (

@@ -173,7 +173,7 @@ def execute(
         interpreter.findings.assume(text, int(words.line[words.row(units[0])]))
         words.value[units] += _G20 - _G70
     dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading, prints=prints)
-    if not prints and detect.is_turned(words, dialect, reading, machine):
+    if not prints and dialect != SIEMENS and detect.is_turned(words, dialect, reading, machine):
         dialect = LATHE
         interpreter.findings.assume(detect.LATHE_NOTE, int(words.line[0]))
     elif dialect != SIEMENS and not reading.strict:

@@ -200,3 +200,11 @@ def test_the_remedy_of_an_arc_is_no_code_of_another_control() -> None:
 def test_a_missing_subprogram_says_where_its_file_belongs() -> None:
     with pytest.raises(InputError, match=r"put its file \(HOLE.SPF or HOLE.MPF\) beside the program"):
         read('G71 G0 X=1\nEXTCALL("HOLE")')
+
+
+def test_a_lathe_that_the_machine_file_names_has_its_own_language() -> None:
+    text = "G18 G90 G95 DIAMON\nS500 M4\nG0 X50 Z2\nG1 Z-20 F0.2\nG2 X60 Z-25 CR=5\nM30"
+    program = read(text, {**MILL, "dialect": {"lathe": True}})
+    np.testing.assert_allclose(program.end, [[25, 0, 2], [25, 0, -20], [30, 0, -25]], atol=1e-9)
+    assert program.expansion is not None
+    assert program.expansion.dialect == "siemens"

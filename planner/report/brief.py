@@ -106,7 +106,7 @@ def limit_text(name: str) -> str:
     quantity, _, axis = name.partition(".")
     if name in FURTHER or quantity not in QUANTITIES or not axis:
         return FURTHER.get(name, name)
-    return f"{QUANTITIES[quantity]} of {axis.upper()}"
+    return f"{QUANTITIES[quantity]} of {axis[:-1]}{axis[-1].upper()}"
 
 
 def _time(plan: Plan) -> str:

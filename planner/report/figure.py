@@ -27,6 +27,7 @@ from planner.report.word_feed import WordFeed
 if TYPE_CHECKING:
     from planner.machine import Machine
     from planner.motion.trajectory import Trajectory
+    from planner.nc.program import Program
     from planner.planning.job.plan import Plan
 
 
@@ -69,6 +70,7 @@ def limit_colours(names: Sequence[str]) -> list[str]:
 
 AGAINST = {"t": "time [s]", "s": "length along the path [mm]", "line": "NC line"}
 QUANTITIES = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}
+TINY = 1e-9  # of a length or a scale, where nothing moves
 FLAT = 0.12  # third extent over the largest below which a path is seen along it
 
 
@@ -195,14 +197,31 @@ def highest_feed(feed: FloatArray, programmed: FloatArray) -> float:
 
 
 def flat_view(extent: FloatArray) -> list[int] | None:
-    """The two axes, to the right and up, that show a nearly flat path of an `extent` (2 or 3,) best; turned parts lie. None
+    """The two axes, to the right and up, that show a nearly flat path of an `extent` (3,) best; turned parts lie. None
     for a path that needs three."""
-    if len(extent) == 2:
-        return [0, 1]
     thin = int(extent.argmin())
-    if extent[thin] > FLAT * extent.max():
+    if extent[thin] > FLAT * max(float(extent.max()), TINY):
         return None
     return [2, 0] if thin == 1 and extent[2] > extent[0] else [k for k in range(len(extent)) if k != thin]
+
+
+DWARFED, BESIDE = 2.0, 0.08  # of the extent of the feed moves: what hides them, what is shown around them [-]
+
+
+def shown_part(program: Program, block: Array, points: FloatArray) -> FloatArray:
+    """(2, 3) the least and the greatest place that a picture shows of `points` (n, 3) in the blocks `block` (n,) [mm]: of
+    all, but where rapids, and travel of printers, make it more than `DWARFED` as large as the part, around that."""
+    whole = np.stack([points.min(axis=0), points.max(axis=0)])
+    at = np.clip(block, 0, None)
+    works = (program.extruded > 0.0) if np.any(program.extruded > 0.0) else program.kind != Kind.RAPID
+    part = points[works[at]] if works[at].any() else points
+    near = np.stack([part.min(axis=0), part.max(axis=0)])
+    size = float(np.ptp(near, axis=0).max())
+    if not 0.0 < DWARFED * size < np.ptp(whole, axis=0).max():
+        return whole
+    return np.stack(
+        [np.maximum(near[0] - BESIDE * size, whole[0]), np.minimum(near[1] + BESIDE * size, whole[1])]
+    )
 
 
 def three(shown: Trajectory) -> FloatArray:

@@ -27,7 +27,9 @@ from planner.report.figure import (
     LIGHT,
     LOW_TO_HIGH,
     PRICES,
+    TINY,
     Panel,
+    flat_view,
     highest_feed,
     limit_colours,
 )
@@ -41,13 +43,12 @@ GAP = 0.07  # between panels, of the height of the figure [-]
 BEYOND = 112  # what is seen of an axis in per cent of limits [%]
 MARGIN = 1.08  # of the axes of a scene over the path [-]
 THIN = FLAT / 4  # an axis is as long as this share of the longest at least [-], so that a line has a scene
-FILLED = 0.76  # share of the box that the path fills [-]; titles of axes stand in the rest
+FILLED = 0.72  # share of the box that the path fills [-]; titles of axes stand in the rest
 DISTANCE = 2.0  # of the eye, in units of the scene [-]; it changes nothing in an orthographic view
 AWAY = np.array([1.2, -1.3, 0.9])  # where a path that is not flat is seen from
 LINE = {"width": 5, "showscale": True}
 BAR: dict[str, Any] = {"title": {"text": ""}, "thickness": 12, "len": 0.8, "outlinewidth": 0}
 TICKS, LONGEST = 24, 18  # names beside a bar, and letters of each
-TINY = 1e-9  # of a scale, where nothing moves
 BARE = {"l": 0, "r": 0, "t": 0, "b": 0}
 BEYOND_NOTE = {
     "xanchor": "right",
@@ -55,6 +56,7 @@ BEYOND_NOTE = {
     "showarrow": False,
     "font": {"size": 11, "color": DIM},
 }
+RAPIDS = {"light": LIGHT, "dark": GREY}  # fainter than all feeds on either ground
 SLOWER = 0.03  # of the scale of the feed, below zero: rapids [-]
 PROGRAMMED = {
     "type": "scatter3d", "mode": "lines", "name": "programmed", "hoverinfo": "skip", "opacity": 0.5,
@@ -131,7 +133,7 @@ def colourings(samples: Samples, units: Units) -> dict[str, dict[str, Any]]:
         found[column] = {"column": column, "scale": scale}
         if column == "feed":
             line["cmin"] = found[column]["rapid"] = -SLOWER * max(line["cmax"], TINY)
-            scales = {ground: _with_rapids(colours) for ground, colours in scales.items()}
+            scales = {ground: _with_rapids(colours, RAPIDS[ground]) for ground, colours in scales.items()}
         found[column] |= {ground: line | {"colorscale": colours} for ground, colours in scales.items()}
     named = [WORDS.get(name, name) for name in samples.limits]
     found["limit"] = _of_names("limit", named, limit_colours(samples.limits))
@@ -141,10 +143,10 @@ def colourings(samples: Samples, units: Units) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _with_rapids(colours: list[list[Any]]) -> list[list[Any]]:
-    """A scale with grey below zero."""
+def _with_rapids(colours: list[list[Any]], rapid: str) -> list[list[Any]]:
+    """A scale with the colour of rapids below zero."""
     zero = SLOWER / (1.0 + SLOWER)
-    return [[0.0, GREY], [zero, GREY], *([zero + (1.0 - zero) * at, colour] for at, colour in colours)]
+    return [[0.0, rapid], [zero, rapid], *([zero + (1.0 - zero) * at, colour] for at, colour in colours)]
 
 
 def _of_names(column: str, names: Sequence[str], shades: Sequence[str]) -> dict[str, Any]:
@@ -165,24 +167,23 @@ def fitted_scene(points: FloatArray, titles: Mapping[str, str]) -> tuple[dict[st
     path then is on the screen, in units of the scene: `aspectratio`, `camera`, and the ranges of the axes."""
     low, end = points.min(axis=0), points.max(axis=0)
     length = end - low
-    size = max(float(length.max()), 1e-9)
-    thin = int(length.argmin())
-    flat = bool(length[thin] < FLAT * size)
-    right, up = _flat_view(thin, length) if flat else _view_of_a_body()
+    size = max(float(length.max()), TINY)
+    view = flat_view(length)
+    right, up = _view_of_a_body() if view is None else np.eye(3)[view]
     ratio = np.maximum(length / size, THIN)
     middle, half = 0.5 * (low + end), 0.5 * MARGIN * ratio * size
     scene: dict[str, Any] = {
         f"{letter}axis": {
             "title": {"text": titles[letter]},
             "range": [float(middle[k] - half[k]), float(middle[k] + half[k])],
-            "visible": not (flat and k == thin),
+            "visible": view is None or k in view,
         }
         for k, letter in enumerate(LINEAR_AXES)
     }
     scene["camera"] = {
         "projection": {"type": "orthographic"},
         "eye": _named(np.cross(right, up) * DISTANCE),
-        "up": _named(up if flat else np.array([0.0, 0.0, 1.0])),
+        "up": _named(np.array([0.0, 0.0, 1.0]) if view is None else up),
     }
     scene |= {"aspectmode": "manual", "aspectratio": _named(MARGIN * ratio)}
     return scene, float(ratio @ np.abs(right)), float(ratio @ np.abs(up))
@@ -194,15 +195,6 @@ def scene_in_box(points: FloatArray, room: float, titles: Mapping[str, str]) -> 
     scene, wide, high = fitted_scene(points, titles)
     zoom = FILLED * 2.0 * min(room / wide, 1.0 / high)
     return scene | {"aspectratio": {axis: zoom * ratio for axis, ratio in scene["aspectratio"].items()}}
-
-
-def _flat_view(thin: int, length: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Right and up of a view along axis `thin`; what is longer along z than along x, a turned part, lies
-    down."""
-    x, y, z = np.eye(3)
-    if thin == 1:
-        return (z, x) if length[2] > length[0] else (x, z)
-    return (y, z) if thin == 0 else (x, y)
 
 
 def _view_of_a_body() -> tuple[FloatArray, FloatArray]:

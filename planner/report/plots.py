@@ -17,11 +17,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.nc.program import Kind
-from planner.report.figure import LOW_TO_HIGH, TOOL, MotionColumns, flat_view, three, tool_lines
+from planner.report.figure import LOW_TO_HIGH, TOOL, MotionColumns, flat_view, shown_part, three, tool_lines
 from planner.report.html.data import programmed_path
 from planner.report.profiles_figure import profiles_figure
 from planner.report.units import Units, axis_titles, units_of
@@ -57,11 +58,17 @@ def write_figures(plan: Plan, directory: Path, units: str | None = None) -> None
         profiles_figure(plan, shown_in).savefig(directory / "profiles.png", bbox_inches="tight")
 
 
+EDGE = 0.01  # of the extent: what is drawn beyond the edge of a picture [-]
 PIXELS = 900  # about the extent of a tool path in pixels
 POINTS_MAX = SIZES.picture_points
 DENSE = SIZES.picture_dense
 POINTS_PROGRAMMED = 10_000_000  # of the programmed path before one is kept for each pixel: 240 MB
 NAMES = "XYZ"
+ELEVATION, AZIMUTH = 32, -62  # where a path that is not flat is seen from [deg]
+_SIN, _COS = np.sin(np.deg2rad([ELEVATION, AZIMUTH])), np.cos(np.deg2rad([ELEVATION, AZIMUTH]))
+# (2, 3) how wide and how high a box is there, by its edges
+SEEN_FROM = np.abs([[_SIN[1], _COS[1], 0.0], [_SIN[0] * _COS[1], _SIN[0] * _SIN[1], _COS[0]]])
+FILLS = 0.86  # of its place that the box around a path fills; titles of axes stand in the rest [-]
 SCALE = matplotlib.colors.LinearSegmentedColormap.from_list("feed", LOW_TO_HIGH["light"])
 TOOLS = 240  # places at which the tool is drawn
 GREY, LIGHT = "#8c8c8c", "#b5b5b5"
@@ -75,22 +82,25 @@ def toolpath_figure(plan: Plan, units: Units) -> Figure:
     trajectory = plan.trajectory
     assert trajectory is not None
     motion, titles = three(trajectory) / units.mm, axis_titles(plan.program, units)
-    view = flat_view(np.ptp(motion, axis=0))
+    part = shown_part(plan.program, trajectory.block, motion)
+    view, extent = flat_view(np.ptp(part, axis=0)), float(np.ptp(part, axis=0).max())
     shown = [0, 1, 2] if view is None else view
-    keep = one_per_pixel(motion[:, shown])
-    points, columns = motion[keep][:, shown], MotionColumns(plan, trajectory.rows(keep))
+    keep = one_per_pixel(motion[:, shown], extent)
+    points, columns = _within(part, motion[keep])[:, shown], MotionColumns(plan, trajectory.rows(keep))
     feed = units.per_feed * columns["feed"]
     rapid = plan.program.kind[columns.shown.block] == Kind.RAPID
-    figure, axes = _canvas(np.ptp(points, axis=0), flat=view is not None)
+    figure, axes = _canvas(np.ptp(part[:, shown], axis=0), flat=view is not None)
     collection = Line3DCollection if view is None else LineCollection
     around: Any = {"color": "black", "linestyle": "", "zorder": 5}
     axes.plot(*points[:1].T, label="start", marker="o", markersize=7, markerfacecolor="white", **around)
     axes.plot(*points[-1:].T, label="end", marker="s", markersize=4, **around)
-    path = programmed_path(plan.toolpath, most=POINTS_PROGRAMMED)[:, shown] / units.mm
-    axes.plot(*path[one_per_pixel(path)].T, label="programmed", color=LIGHT, linewidth=0.5, zorder=1)
+    path = programmed_path(plan.toolpath, most=POINTS_PROGRAMMED) / units.mm
+    path = _within(part, path[one_per_pixel(path, extent)])[:, shown]
+    axes.plot(*path.T, label="programmed", color=LIGHT, linewidth=0.5, zorder=1)
     if rapid.any():
         broken = np.where((rapid | np.append(rapid[1:], False))[:, None], points, np.nan)
-        axes.plot(*broken.T, label="rapid", color=GREY, linewidth=0.6, linestyle=DASHED, zorder=2)
+        label = "rapid, also beyond" if np.isnan(points).any() else "rapid"
+        axes.plot(*broken.T, label=label, color=GREY, linewidth=0.6, linestyle=DASHED, zorder=2)
     ends, moving = np.stack([points[:-1], points[1:]], axis=1), ~rapid[1:]
     line = collection(ends[moving], cmap=SCALE, linewidths=1.5 if len(keep) < DENSE else 0.5, zorder=3)
     line.set_array(0.5 * (feed[:-1] + feed[1:])[moving])
@@ -109,7 +119,7 @@ def toolpath_figure(plan: Plan, units: Units) -> Figure:
         figure.legend(loc="outside upper center", **legend)
         bar = figure.colorbar(line, ax=axes, shrink=0.8, aspect=28, pad=0.02)
     else:
-        _solid_axes(axes, motion if tools is None else np.vstack([motion, tools[:, 1]]), titles)
+        _solid_axes(axes, part if tools is None else np.vstack([part, *tools]), titles)
         figure.legend(loc="upper center", bbox_to_anchor=(0.45, 1.0), **legend)
         bar = figure.colorbar(line, cax=figure.add_axes((0.95, 0.22, 0.02, 0.5)))
     bar.set_label(f"feed [{units.feed}]")
@@ -119,19 +129,27 @@ def toolpath_figure(plan: Plan, units: Units) -> Figure:
 
 
 def _canvas(extent: FloatArray, *, flat: bool) -> tuple[Figure, Any]:
-    """A figure of about the path's proportions."""
+    """A figure of about the path's proportions, of `extent` (2 or 3,)."""
     if not flat:
-        figure = Figure(figsize=(6.4, 5.0))
-        return figure, figure.add_axes((0.0, 0.0, 0.88, 0.92), projection="3d", computed_zorder=False)
+        wide, high = SEEN_FROM @ extent
+        figure = Figure(figsize=(6.4, min(max(5.4 * high / wide, 2.2), 5.0)))
+        return figure, figure.add_axes((0.0, 0.0, 0.88, 0.88), projection="3d", computed_zorder=False)
     across, up = extent / max(float(extent.max()), 1e-9)
     figure = Figure(figsize=(1.5 + max(5.0 * across, 2.4), 1.1 + max(5.0 * up, 2.0)), layout="constrained")
     return figure, figure.add_subplot()
 
 
-def one_per_pixel(points: FloatArray) -> Array:
+def _within(part: FloatArray, points: FloatArray) -> FloatArray:
+    """The points (n, 3), NaN outside of a part (2, 3) of the space."""
+    off = EDGE * float(np.ptp(part, axis=0).max())
+    inside = ((points >= part[0] - off) & (points <= part[1] + off)).all(axis=1)
+    return np.where(inside[:, None], points, np.nan)
+
+
+def one_per_pixel(points: FloatArray, extent: float) -> Array:
     """Indices (k,) of the first and the last of the points (n, 2 or 3), and of every point that enters
-    another pixel (or voxel)."""
-    pixel = max(float(np.ptp(points, axis=0).max()) / PIXELS, 1e-9)
+    another pixel (or voxel) of a picture of an `extent`."""
+    pixel = max(extent / PIXELS, 1e-9)
     while True:
         pixels = np.floor((points - points.min(axis=0)) / pixel).astype(np.int32)
         keep = np.flatnonzero((np.diff(pixels, axis=0) != 0).any(axis=1)) + 1
@@ -161,11 +179,22 @@ def _capital(title: str) -> str:
 def _solid_axes(axes: Any, motion: FloatArray, titles: Mapping[str, str]) -> None:
     low, high = motion.min(axis=0), motion.max(axis=0)
     axes.set_proj_type("ortho")
-    axes.view_init(elev=32, azim=-62)
+    axes.view_init(elev=ELEVATION, azim=AZIMUTH)
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_zlim(low[2], high[2])
-    axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=1.08)
+    axes.set_box_aspect(np.maximum(high - low, 1e-9))
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1)
+    x, y, _ = proj_transform(*corners, axes.get_proj())
+    # of the square that a view fills [-]
+    wide, tall = np.ptp(axes.transLimits.transform(np.stack([x, y], axis=1)), axis=0)
+    box, room = axes.get_position(original=True), axes.figure.get_size_inches()
+    across, up = room[0] * box.width, room[1] * box.height  # [inches]
+    zoom = FILLS / min(across, up) * min(across / wide, up / tall)
+    axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=zoom)
+    for line in (*axes.lines, *axes.collections):
+        line.set_clip_on(False)  # at that square, and what is drawn asks for no room of its own
+        line.set_in_layout(False)
     for axis, title, size in zip(
         (axes.xaxis, axes.yaxis, axes.zaxis), titles.values(), high - low, strict=True
     ):

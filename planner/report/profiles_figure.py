@@ -62,7 +62,7 @@ def profiles_figure(plan: Plan, units: Units) -> Figure:
         title = "held by (share of the time, and what more of it saves)"
         spacing: Any = {"title_fontsize": 8, "handlelength": 1.2, "columnspacing": 1.4}
         figure.legend(
-            handles=handles, title=title, loc="outside upper center", ncols=min(len(handles), 3), **spacing
+            handles=handles, title=title, loc="outside upper center", ncols=min(len(handles), 2), **spacing
         )
     free = () if plan.verdict is None else plan.verdict.not_limited
     row = iter(rows[2 if band else 1 :])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 
@@ -23,6 +24,7 @@ from planner.report.figure import (
     flat_view,
     highest_feed,
     limit_colours,
+    shown_part,
     travel_box,
 )
 from planner.report.html.data import samples_of
@@ -60,9 +62,9 @@ def test_rapids_are_grey_below_the_scale_of_the_feed(plan: Plan) -> None:
     assert how["rapid"] == how["light"]["cmin"] < 0.0
     share = -how["rapid"] / (how["light"]["cmax"] - how["rapid"])
     (low, first), (zero, second), (start, third) = how["light"]["colorscale"][:3]
-    assert (low, first, second) == (0.0, GREY, GREY)
+    assert (low, first, second) == (0.0, LIGHT, LIGHT)
     assert zero == start == pytest.approx(share)
-    assert third != GREY
+    assert third != LIGHT
 
 
 def test_the_axis_of_the_feed_ends_above_the_feed_moves(plan: Plan) -> None:
@@ -132,6 +134,29 @@ def test_turned_parts_lie() -> None:
     assert flat_view(np.array([50.0, 0.0, 20.0])) == [0, 2]
     assert flat_view(np.array([50.0, 40.0, 1.0])) == [0, 1]
     assert flat_view(np.array([50.0, 40.0, 30.0])) is None
+
+
+@pytest.mark.parametrize(
+    ("job", "low", "high"),
+    [
+        (
+            "G0 X100 Y100\nG1 X120 F900\nY115\nG0 X0",
+            [98.4, 98.4, 0.0],
+            [120.0, 115.0, 0.0],
+        ),  # around the part
+        ("G0 X9\nG1 X20 F900\nG0 X0", [0.0, 0.0, 0.0], [20.0, 0.0, 0.0]),  # rapids are no longer than that
+        ("G0 X100\nG0 Y9", [0.0, 0.0, 0.0], [100.0, 9.0, 0.0]),  # no feed move
+        ("M83\nG1 X100 F900\nX120 E1\nX0", [98.4, 0.0, 0.0], [120.0, 0.0, 0.0]),  # travel of a printer
+    ],
+)
+def test_pictures_end_around_the_part_where_rapids_go_far(
+    job: str, low: list[float], high: list[float]
+) -> None:
+    program = planner.read_program(text=job + "\n", machine=load_machine("ender3"))
+    share = np.linspace(0.001, 1.0, 1000)[:, None]
+    places = [a + share * (b - a) for a, b in itertools.pairwise([np.zeros(3), *program.end])]
+    found = shown_part(program, np.repeat(np.arange(len(program)), len(share)), np.vstack(places))
+    assert np.allclose(found, [low, high], atol=0.2)
 
 
 def test_lines_of_a_pen_as_fast_as_the_machine_are_no_rapids() -> None:

@@ -64,7 +64,7 @@ def test_the_envelope_keeps_every_peak() -> None:
 def test_thinning_keeps_the_ends_and_stays_within_a_pixel() -> None:
     angle = np.linspace(0.0, 2 * np.pi, 500_000)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    keep = plots.one_per_pixel(circle)
+    keep = plots.one_per_pixel(circle, 2.0)
     assert keep[0] == 0
     assert keep[-1] == len(circle) - 1
     assert len(keep) < 8 * plots.PIXELS

@@ -24,13 +24,14 @@ from planner.nc.program import Kind
 from planner.report.figure import (
     AGAINST,
     CIVIDIS,
-    GREY,
+    LIGHT,
     TOOL,
     MotionColumns,
     highest_feed,
     limit_colours,
     moving_axes,
     profile_panels,
+    shown_part,
     three,
     tool_lines,
     travel_box,
@@ -84,7 +85,9 @@ def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]
     motion = MotionColumns(plan, shown)
     panels = profile_panels(motion, machine, moving_axes(motion.joints), ["acceleration", "jerk"], units)
     titles = axis_titles(program, units)
-    figure, path = panel_figure(panels, "t"), programmed_path(plan.toolpath)
+    figure, path, places = panel_figure(panels, "t"), programmed_path(plan.toolpath), three(shown)
+    everything, part = np.concatenate([places, path]), shown_part(program, shown.block, places)
+    beyond = bool((np.ptp(places, axis=0) > np.ptp(part, axis=0)).any())
     names = {"t", "s", "line", *shown.axes, *(of["y"] for of in figure["columns"])}
     columns: dict[str, Array] = {name: motion[name] for name in sorted(names)}
     columns |= {
@@ -108,12 +111,13 @@ def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]
         "colourings": colourings(samples, units),
         "units": dataclasses.asdict(units) | {"per_feed": units.per_feed},
         "axes": ", ".join(titles[axis] for axis in shown.axes if axis in LINEAR_AXES),
-        "travel": _travel(plan, np.concatenate([three(shown), path]), units, titles),
+        "beyond": "; rapids go on beyond" if beyond else "",
+        "travel": _travel(plan, everything, units, titles),
         "layers": samples.parts.get("layer", ([],))[0],
         "programmed": PROGRAMMED,
         "profile": figure,
         "against": AGAINST,
-        "view": fitted_scene(np.concatenate([three(shown), path]) / units.mm, titles),
+        "view": fitted_scene((part if beyond else everything) / units.mm, titles),
         "step": samples.step,
         "samples": len(plan.trajectory) if plan.trajectory is not None else 0,
         "corners": json_ready(_corners(plan)),
@@ -165,11 +169,12 @@ def path_picture(plan: Plan, size: float) -> str:
     rows = np.unique(np.linspace(0, len(trajectory) - 1, min(POINTS, len(trajectory))).astype(np.int64))
     shown = trajectory.rows(rows)
     position = three(shown)
-    across = np.sort(np.argsort(-np.ptp(position, axis=0), kind="stable")[:2])
+    part = shown_part(plan.program, shown.block, position)
+    across = np.sort(np.argsort(-np.ptp(part, axis=0), kind="stable")[:2])
     points = position[:, across] * [1.0, -1.0]  # the picture's y goes down
     tools = tool_lines(plan, TOOLS)
     ends = np.zeros((0, 2, 2)) if tools is None else tools[:, :, across] * [1.0, -1.0]
-    everything = np.vstack([points, ends.reshape(-1, 2)])
+    everything = np.vstack([part[:, across] * [1.0, -1.0], ends.reshape(-1, 2)])
     low, extent = everything.min(axis=0), np.ptp(everything, axis=0)
     scale = size / max(float(extent.max()), 1e-9)
     points, ends = ((place - low) * scale + 4.0 for place in (points, ends))
@@ -180,7 +185,7 @@ def path_picture(plan: Plan, size: float) -> str:
     highest, rapid = highest_feed(feed, programmed), len(CIVIDIS)
     colour = np.minimum(feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
     colour[plan.program.kind[np.clip(shown.block, 0, None)] == Kind.RAPID] = rapid
-    shades = [*CIVIDIS, GREY]
+    shades = [*CIVIDIS, LIGHT]
     lines = "".join(
         f'<polyline points="{_points(pair)}" stroke="{TOOL}" stroke-width="0.5"/>' for pair in ends
     )

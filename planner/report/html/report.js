@@ -56,7 +56,7 @@
 
   // The first picture is painted with the header; what takes longer follows (a page in the background paints nothing, and goes on).
   await Promise.race([new Promise((painted) => requestAnimationFrame(() => setTimeout(painted, 0))), new Promise((late) => setTimeout(late, 500))]);
-  element("axes").textContent = about.axes.replaceAll(` [${about.units.length}]`, "") + ` in ${about.units.length}`;
+  element("axes").textContent = about.axes.replaceAll(` [${about.units.length}]`, "") + ` in ${about.units.length}${about.beyond}`;
   mark("first picture");
   const script = make("script", element("plotly").textContent);
   element("plotly").remove();

@@ -1,5 +1,5 @@
 // What the pages draw alike: figures in plotly's words (plotly_figure.py), whose traces name columns instead of numbers.
-const BUCKETS = 1200, COLOURBAR = 120, FILLED = 0.76;
+const BUCKETS = 1200, COLOURBAR = 120, FILLED = 0.72;
 // Okabe and Ito's colours, told apart with red-green blindness too, and those of text, where the ground is dark.
 const ON_DARK = { "#0072B2": "#56B4E9", "#56B4E9": "#0072B2", "#009E73": "#2fc49a", "#1d2430": ink, "#667085": dim };
 const shade = (colour) => (dark && ON_DARK[colour]) || colour;
@@ -44,7 +44,7 @@ function panels(figure, against, range) {
   });
   const xaxis = { ...figure.layout.xaxis, title: { text: about.against[against] } };
   const annotations = (innerWidth > 700 ? figure.layout.annotations || [] : []).map((note) => ({ ...note, font: { ...note.font, color: dim } }));
-  return [data, { ...look, ...figure.layout, annotations, xaxis, margin: { l: 62, r: 14, t: 8, b: 42 } }];
+  return [data, { ...look, ...figure.layout, annotations, xaxis, margin: { l: 62, r: 14, t: 34, b: 42 } }];
 }
 
 // Buttons of which one is on; name: of their choice in the page

@@ -4,7 +4,6 @@ definitions, committed with their outputs. README shows pictures of three of the
 from __future__ import annotations
 
 import ast
-import asyncio
 import base64
 import re
 from pathlib import Path
@@ -15,11 +14,23 @@ from nbformat import NotebookNode
 
 FOLDER = Path(__file__).resolve().parent.parent / "notebooks"
 NAMES = sorted(file.name for file in FOLDER.glob("*.ipynb"))
-# Before the first cell: warnings are errors, but for those of the kernel itself.
-STRICT = (
-    "import warnings\nwarnings.simplefilter('error')\nwarnings.filterwarnings('ignore', module='ipykernel')"
-)
-AT_ONCE = 2
+# Before the first cell of each: of the one before nothing is left but what it imported, and warnings are errors, but
+# for those of the kernel itself.
+FRESH = """%reset -f
+def fresh():
+    import sys, warnings
+    import matplotlib.pyplot
+    matplotlib.pyplot.close("all")
+    matplotlib.rcdefaults()
+    sys.path[:] = [place for place in sys.path if place != ".."]
+    for name in list(sys.modules):
+        if name.partition(".")[0] == "benchmarks":
+            del sys.modules[name]
+    warnings.simplefilter("error")
+    warnings.filterwarnings("ignore", module="ipykernel")
+fresh()
+del fresh
+"""
 TIMEOUT = 300  # [s] for one cell; the first run of a fresh installation compiles kernels
 SIZE_MAX = 450_000  # [bytes]
 CODE_CELLS_MAX = 9
@@ -40,38 +51,34 @@ def code(notebook: NotebookNode) -> list[NotebookNode]:
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
-async def execute_all() -> dict[str, NotebookNode | Exception]:
-    """Each notebook with its outputs, or the error that ended it."""
-    from nbclient import NotebookClient  # 0.2 s, and only slow tests need it
-    from nbclient.exceptions import CellExecutionError
-
-    turn = asyncio.Semaphore(AT_ONCE)
-
-    async def execute(name: str) -> NotebookNode | Exception:
-        notebook = read(name)
-        notebook.cells.insert(0, nbformat.v4.new_code_cell(STRICT))
-        client = NotebookClient(
-            notebook, timeout=TIMEOUT, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
-        )
-        async with turn:
-            try:
-                return await client.async_execute()
-            except CellExecutionError as fault:
-                return fault
-
-    return dict(zip(NAMES, await asyncio.gather(*map(execute, NAMES)), strict=True))
-
-
 @pytest.fixture(scope="module")
-def executed() -> dict[str, NotebookNode | Exception]:
-    return asyncio.run(execute_all())
+def executed() -> dict[str, list[NotebookNode]]:
+    """`FRESH` and the code cells of each notebook with their outputs.
+
+    All are run by one kernel: starting it and importing take as long as most notebooks.
+    """
+    from nbclient import NotebookClient  # 0.2 s, and only slow tests need it
+
+    whole, begins = nbformat.v4.new_notebook(), dict[str, int]()
+    for name in NAMES:
+        begins[name] = len(whole.cells)
+        whole.cells += [nbformat.v4.new_code_cell(FRESH), *code(read(name))]
+    client = NotebookClient(
+        whole,
+        timeout=TIMEOUT,
+        kernel_name="python3",
+        allow_errors=True,
+        resources={"metadata": {"path": str(FOLDER)}},
+    )
+    client.execute()
+    return {name: whole.cells[at : at + 1 + len(code(read(name)))] for name, at in begins.items()}
 
 
-def kinds(notebook: NotebookNode) -> list[list[str]]:
+def kinds(cells: list[NotebookNode]) -> list[list[str]]:
     """What each code cell gives: the kinds of text and pictures."""
     return [
         sorted({kind for one in cell.outputs for kind in one.get("data", {one.output_type: 0})})
-        for cell in code(notebook)
+        for cell in cells
     ]
 
 
@@ -109,16 +116,15 @@ def test_readme_shows_the_pictures_of_the_notebooks(name: str, number: int) -> N
 @pytest.mark.shows("notebooks", "sampled: they run, and their assertions hold")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_it_runs_without_error_or_warning(executed: dict[str, NotebookNode | Exception], name: str) -> None:
+def test_it_runs_without_error_or_warning(executed: dict[str, list[NotebookNode]], name: str) -> None:
     made = executed[name]
-    if isinstance(made, Exception):
-        raise made
-    outputs = [output for cell in code(made) for output in cell.outputs]
+    outputs = [output for cell in made for output in cell.outputs]
+    assert not ["\n".join(output.traceback) for output in outputs if output.output_type == "error"]
     assert not [
         output.text for output in outputs if output.output_type == "stream" and output.name == "stderr"
     ]
     assert sum("image/png" in output.get("data", {}) for output in outputs) >= 2
-    assert kinds(made)[1:] == kinds(read(name))  # behind the cell that makes warnings errors
+    assert kinds(made[1:]) == kinds(code(read(name)))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -230,31 +230,53 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]], subprocess.Pop
             process.communicate()
 
 
-@pytest.mark.shows("sweep", "exact: a point is the plan with its settings, on processes and on a cluster")
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
-def test_a_cluster_goes_on_without_a_worker_that_is_killed(
-    cluster: tuple[str, list[subprocess.Popen[str]], subprocess.Popen[str]], job: Path, tmp_path: Path
-) -> None:
-    address, workers, _ = cluster
-    out, count = tmp_path / "out", 40
-    arguments = ["sweep", str(job), "-o", str(out), "--vary", f"x.jerk=1e5:2e5:{count}", "--method", "stop"]
-    command = [sys.executable, "-m", "planner", *arguments, "--cluster", address, "-q"]
+def sweep_on(address: str, job: Path, out: Path, count: int) -> list[str]:
+    """The command of so many points on a cluster."""
+    ranges = ["--vary", f"x.jerk=1e5:2e5:{count}", "--method", "stop"]
+    return [
+        sys.executable,
+        "-m",
+        "planner",
+        "sweep",
+        str(job),
+        "-o",
+        str(out),
+        *ranges,
+        "-q",
+        "--cluster",
+        address,
+    ]
+
+
+def killed_on_the_way(
+    command: list[str], out: Path, victim: subprocess.Popen[str]
+) -> tuple[int, int, str, str]:
+    """A process of the cluster is killed when the sweep has its first points: how many were there, and how the command ended."""
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
     ) as process:
         while not (out / "points").exists() or not list((out / "points").glob("*.json")):
             assert process.poll() is None, process.communicate()
             time.sleep(0.02)
         there = len(list((out / "points").glob("*.json")))
-        workers[0].send_signal(signal.SIGKILL)
+        victim.send_signal(signal.SIGKILL)
         said, err = process.communicate(timeout=300)
+    return there, process.returncode, said, err
+
+
+@pytest.mark.shows("sweep", "exact: a point is the plan with its settings, on processes and on a cluster")
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
+def test_a_cluster_goes_on_without_a_worker_that_is_killed_and_ends_with_its_scheduler(
+    cluster: tuple[str, list[subprocess.Popen[str]], subprocess.Popen[str]], job: Path, tmp_path: Path
+) -> None:
+    """Without its scheduler a sweep ends with a sentence; what was planned stays, and the same command goes on with it."""
+    address, workers, scheduler = cluster
+    out, count = tmp_path / "out", 40
+    there, code, said, err = killed_on_the_way(sweep_on(address, job, out, count), out, workers[0])
     assert there < count  # it was on its way
-    assert process.returncode == 0, err
+    assert code == 0, err
     assert f"points   {count}: {count} passed" in said
     table = pq.read_table(out / "sweep.parquet").to_pydict()
     np.testing.assert_allclose(table["axes.x.jerk"], np.linspace(1e5, 2e5, count))
@@ -264,32 +286,15 @@ def test_a_cluster_goes_on_without_a_worker_that_is_killed(
     assert own["cycle_time_s"] == pytest.approx(table["cycle_time_s"][-1], rel=1e-12)
     assert workers[1].poll() is None
 
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
-def test_a_scheduler_that_is_killed_ends_the_sweep_with_a_sentence(
-    cluster: tuple[str, list[subprocess.Popen[str]], subprocess.Popen[str]], job: Path, tmp_path: Path
-) -> None:
-    """What was planned stays, and the same command goes on with it."""
-    address, _, scheduler = cluster
-    out, count = tmp_path / "out", 60
-    command = [sys.executable, "-m", "planner", "sweep", str(job), "-o", str(out), "--method", "stop", "-q"]
-    command += ["--vary", f"x.jerk=1e5:2e5:{count}"]
-    env = os.environ | {"PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(
-        [*command, "--cluster", address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
-    ) as process:
-        while not (out / "points").exists() or not list((out / "points").glob("*.json")):
-            assert process.poll() is None, process.communicate()
-            time.sleep(0.02)
-        scheduler.send_signal(signal.SIGKILL)
-        _, err = process.communicate(timeout=120)
+    out, count = tmp_path / "second", 60
+    command = sweep_on(address, job, out, count)
+    _, code, _, err = killed_on_the_way(command, out, scheduler)
     there = len(list((out / "points").glob("*.json")))
     assert 0 < there < count
-    assert process.returncode == 3, err
+    assert code == 3, err
     assert "the scheduler has gone" in err
     assert "Traceback" not in err, err
-    done = subprocess.run([*command, "--threads", "1"], capture_output=True, text=True, env=env, check=True)
+    done = run(job, "-o", out, "--vary", f"x.jerk=1e5:2e5:{count}", "--method", "stop", "-q", "--threads", 1)
     assert f"points   {count}, {there} of them planned before: {count} passed" in done.stdout
 
 

@@ -235,14 +235,18 @@ def test_the_judge_finds_the_tangential_jerk_used_up_and_exceeded(columns):
         assert [fault.name for fault in verdict.faults] == [TANGENTIAL_JERK.name] * (by > 1.0)
 
 
-def test_the_judge_finds_the_power_of_a_drive_used_up():
-    """Round the circle v_x a_x is v^3/2R at most."""
+@pytest.mark.parametrize("columns", [("velocity", "acceleration", "jerk"), ()], ids=["columns", "positions"])
+def test_the_judge_finds_the_power_of_a_drive_used_up(columns):
+    """Round the circle v_x a_x is v^3/2R at most; positions show it less what the speed may change by within a period."""
     machine = machine_with()
     driven = {name: axis.model_copy(update={"power": 0.0108}) for name, axis in machine.axes.items()}
     machine = machine.model_copy(update={"axes": driven})
     speed = float(np.cbrt(2.0 * RADIUS * POWER.of(machine, ("x",))[0]))
-    check = judge(steady(speed), circle().toolpath(machine), machine).limits["power.x"]
-    assert (check.ratio, check.unit) == (pytest.approx(1.0, abs=CLOSE), POWER.unit)
+    delivered = sample(steady(speed), machine.dt)
+    verdict = verify(delivered, circle().toolpath(machine), machine, given=Given(columns=columns))
+    check = verdict.limits["power.x"]
+    assert (check.ratio, check.unit) == (pytest.approx(1.0, abs=CLOSE if columns else 0.1), POWER.unit)
+    assert columns or check.ratio < 1.0
 
 
 @pytest.mark.parametrize("columns", [("velocity", "acceleration", "jerk"), ()], ids=["columns", "positions"])

@@ -43,7 +43,9 @@ def checks(limit, columns, faster=1.0):
         along(length, curve, (length / SPEED, lambda t: (SPEED * t, SPEED + 0 * t, 0 * t, 0 * t))),
         own.dt,
     )
-    told = dataclasses.replace(motion, velocity=faster * motion.velocity)
+    by = {name: float(name in columns) for name in ("velocity", "acceleration", "jerk")}  # as files are read
+    by["velocity"] *= faster
+    told = dataclasses.replace(motion, **{name: share * getattr(motion, name) for name, share in by.items()})
     toolpath = Moves((RADIUS, 0.0, 0.0)).arc((0.0, 0.0), SWEEP, feed=1e3).toolpath(own)
     return verify(told, toolpath, own, given=Given(columns=columns)).limits
 

@@ -2,10 +2,11 @@
 
     python -m benchmarks.mutants [--each N] [--areas NAME ...] [--seed S] [--again] [--seconds T]     into results/mutants.md and .json
 
-N mutants of each area (draw.py) are tried one after the other: the quick tests that name the file's module, or mirror its folder, run
-in a copy of the checkout with the mutant in it (trial.py), up to the first failure of a test that passes without it. What became of a
-mutant is kept in mutants.json at once, and it is not tried again; --again tries those that survived once more, and --seconds begins no
-other after so many. reasons.toml says of survivors why they are right, or what they change that nobody asks for.
+N mutants of each area (draw.py) are tried one after the other: the quick tests that run its line (covered.py) run in a copy of the
+checkout with the mutant in it (trial.py), up to the first failure of a test that passes without it. What became of a mutant is kept in
+mutants.json at once, and it is not tried again; --again tries those that survived once more, and --seconds begins no other after so
+many. reasons.toml says of survivors why they are right, or what they change that nobody asks for. Which tests run which lines is found
+once for each area, in about the time of its quick tests (coverage.py must be installed), and kept in build/; --cover finds it anew.
 """
 
 from __future__ import annotations
@@ -20,12 +21,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.mutants.covered import Covered
 from benchmarks.mutants.draw import AREAS, Mutant, drawn
-from benchmarks.mutants.trial import KILLED, NO_END, SURVIVED, copy_of_checkout, outcome, room_of, run
-from benchmarks.record import RESULTS, markdown, planner_state, write_results
+from benchmarks.mutants.trial import (
+    KILLED,
+    NO_END,
+    SURVIVED,
+    copy_of_checkout,
+    covered,
+    outcome,
+    room_of,
+    run,
+)
+from benchmarks.record import RESULTS, ROOT, markdown, planner_state, write_results
 
 NAME = "mutants"
 KEPT = RESULTS / f"{NAME}.json"
+COVERED = ROOT / "build"
 REASONS = Path(__file__).with_name("reasons.toml")
 SAME, ELSEWHERE, OPEN = (
     "same",
@@ -95,6 +107,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--again", action="store_true", help="those that survived once more")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no mutant after so many")
+    parser.add_argument("--cover", action="store_true", help="find anew which tests run which lines")
     parser.add_argument(
         "--list", action="store_true", help="print the mutants and their tests, and do no more"
     )
@@ -105,14 +118,24 @@ def main() -> None:
         for mutant in wanted:
             print(mutant.area, mutant.key, *room_of(mutant.file), sep="\n    ")
         return
-    rows, end = kept(), time.monotonic() + options.seconds
-    told = Told(set(), set())
+    rows, known = kept(), dict[str, Covered]()
     with tempfile.TemporaryDirectory() as place, copy_of_checkout(Path(place)) as folder:
+        told, end = Told(set(), set()), time.monotonic() + options.seconds
         for mutant in wanted:
             before = rows.get(mutant.key)
             if time.monotonic() > end or (before and not (options.again and before["became"] == SURVIVED)):
                 continue
-            rows[mutant.key] = _tried(mutant, folder, told)
+            if mutant.area not in known:
+                file = COVERED / f"covered-{mutant.area}.json"
+                if options.cover:
+                    file.unlink(missing_ok=True)
+                known[mutant.area] = covered(folder, [m for m in wanted if m.area == mutant.area], file)
+                told.sound |= {name.removeprefix("tests/") for name in known[mutant.area].seconds}
+            try:
+                rows[mutant.key] = _tried(mutant, folder, known[mutant.area], told)
+            except RuntimeError as fault:  # it is tried again by the next run
+                print(mutant.key, fault, flush=True)
+                continue
             write_results(NAME, {"rows": list(rows.values())}, page(list(rows.values())))
             print(*(rows[mutant.key][name] for name in ("became", "key", "by", "cpu")), flush=True)
 
@@ -125,15 +148,16 @@ class Told:
     broken: set[str]
 
 
-def _tried(mutant: Mutant, folder: Path, told: Told) -> Row:
+def _tried(mutant: Mutant, folder: Path, known: Covered, told: Told) -> Row:
     """The row of a mutant."""
-    tests, spent = room_of(mutant.file), 0.0
-    while True:
-        became, by, cpu = outcome(mutant, folder, tests, told.broken)
+    tests, spent = known.tests_of(folder, mutant.file, mutant.line, room_of(mutant.file)), 0.0
+    became, by = SURVIVED, "no test runs it"
+    while tests:
+        became, by, cpu = outcome(mutant, folder, tests, told.broken, known.seconds)
         spent += cpu
         if became != KILLED or not by or by in told.sound:
             break
-        without = run(folder, [f"tests/{by}"], set())[0]
+        without = run(folder, [f"tests/{by}"], set(), known.seconds)[0]
         (told.sound if without == SURVIVED else told.broken).add(by)
         if without == SURVIVED:
             break

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.mutants import ELSEWHERE, OPEN, SAME, counts, reasons
+from benchmarks.mutants.covered import BUDGET, Covered, digest, statement
 from benchmarks.mutants.draw import AREAS, drawn
 from benchmarks.mutants.trial import KILLED, NO_END, SURVIVED, room_of
 from benchmarks.record import ROOT
@@ -38,6 +39,38 @@ def test_tests_are_those_of_the_module_and_of_its_room() -> None:
     found = room_of("planner/verifier/stops.py")
     assert "tests/verifier/test_faults_of_order.py" in found
     assert all(name.startswith("tests/") for name in found)
+
+
+SOURCE = "LIMIT = 2\n\n\ndef less(a, b):\n    if (\n        a\n        < b\n    ):\n        return 1\n    return LIMIT\n"
+
+
+def test_lines_of_a_statement() -> None:
+    assert statement(SOURCE, 1) == (range(1, 2), False)
+    assert statement(SOURCE, 6) == statement(SOURCE, 5) == (range(5, 9), True)
+    assert statement(SOURCE, 9) == (range(9, 10), True)
+
+
+def test_tests_of_a_line(tmp_path: Path) -> None:
+    """Those that run it, of the room first and then the shortest, as long as there is time; all of the room for what importing runs."""
+    (tmp_path / "a.py").write_text(SOURCE)
+    for name in ("t.py", "other.py"):
+        (tmp_path / name).write_text("")
+    seconds = {"t.py::long": BUDGET, "t.py::short": 0.1, "other.py::first": 0.1, "other.py::second": 0.2}
+    lines = {1: [], 4: [], 5: ["t.py::long", "other.py"], 9: ["t.py::short", "t.py::long"]}
+    digests = {name: digest(tmp_path / name) for name in ("a.py", "t.py", "other.py")}
+    known = Covered({"a.py": lines}, seconds, digests)
+
+    def tests(line: int) -> list[str]:
+        return known.tests_of(tmp_path, "a.py", line, ["t.py"])
+
+    assert tests(9) == ["t.py::short"]
+    assert tests(7) == ["t.py::long"]  # it alone takes all the time
+    assert tests(10) == []  # no test runs it
+    assert tests(1) == ["t.py::short"]
+    (tmp_path / "t.py").write_text("# changed\n")
+    assert tests(7) == ["t.py", "other.py::first", "other.py::second"]
+    known.write(tmp_path / "build" / "known.json")
+    assert Covered.read(tmp_path / "build" / "known.json") == known
 
 
 TRIED = """

@@ -42,6 +42,9 @@ def test_it_follows_the_delivered_motion(name):
     assert dict(grid.ranked()).get("none", 0.0) < 0.05
     rest = float(plan.toolpath.dwell.sum()) / seen.cycle_time
     assert dict(grid.ranked()).get("rest", 0.0) == pytest.approx(rest, rel=1e-2)
+    assert np.count_nonzero(grid.active == grid.active_names.index("rest")) == np.count_nonzero(
+        plan.toolpath.dwell
+    )
 
 
 def test_the_limit_that_it_names_is_used():

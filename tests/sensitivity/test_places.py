@@ -13,7 +13,9 @@ from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Joint
 from planner.machine import load_machine
+from planner.nc.program import PathControl
 from planner.planning.job.plan import Plan
 from planner.sensitivity.path_prices import bounds_but_speeds, bounds_with
 from planner.sensitivity.prices import MORE_LIMIT
@@ -66,6 +68,22 @@ def test_places_add_up_to_the_whole(zigzag: Plan) -> None:
     assert places.tolerance is None
     assert places.feed.sum() == pytest.approx(-zigzag.prices.feed * TENTH, rel=0.05)
     assert (places.limits >= places.feed - 1e-6).all()
+
+
+def test_prices_of_a_joint_search_stand_where_the_motion_pays() -> None:
+    """The last line alone is run at its feed, and saves what its length says; tolerance saves at corners, not at stops."""
+    points, slow = [[0, 0], [30, 0], [35, 20], [60, 25], [60, 60]], 40.0
+    control = [PathControl.BLEND, PathControl.EXACT_STOP, PathControl.BLEND, PathControl.BLEND]
+    program = problems.polyline(points, feed=np.array([500.0, 500.0, 500.0, slow]), path_control=control)
+    plan = planner.plan(program, MILL)
+    places, stops = places_of(plan), plan.toolpath.joint == Joint.STOP
+    assert places.feed[-1] == pytest.approx(35.0 / slow * TENTH, rel=0.05)
+    assert places.feed[:-1] == pytest.approx([0.0] * 3, abs=1e-5)
+    assert places.limits[-1] > 5.0 * places.limits[:-1].max()
+    assert places.tolerance is not None
+    assert stops.tolist() == [True, False, True, False, True]
+    assert (places.tolerance[stops] == 0.0).all()
+    assert (places.tolerance[~stops] < -0.1).all()
 
 
 @pytest.mark.parametrize("change", ["feed", "velocity.x"])

@@ -12,6 +12,7 @@ from benchmarks.jobs import problems
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.constraints.limits import LIMITS
 from planner.feedrate.grid import refine_for_jerk
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.sampling.samples import sample_path
@@ -20,7 +21,7 @@ from planner.nc.reader import parse_program
 from planner.planning.methods.optimal import SIGMA2, OptimalMethod
 from planner.planning.optimal.geometry import corner_shape
 from planner.sensitivity.path_prices import path_prices
-from planner.sensitivity.prices import MORE_LIMIT
+from planner.sensitivity.prices import MORE_LIMIT, more_of
 from planner.sensitivity.records import SAVED_MIN
 
 MACHINE = problems.machine()
@@ -216,3 +217,17 @@ def test_on_a_path_the_tolerance_has_no_price(corner):
     assert plan.prices.tolerance is None
     assert "tolerance" not in plan.prices.saved
     assert plan.prices.saved["feed"] > 0.0
+
+
+@pytest.mark.parametrize("limit", [limit for limit in LIMITS if limit.key], ids=lambda limit: limit.name)
+def test_more_of_a_limit_of_the_whole_machine_is_more_of_its_key_alone(limit) -> None:
+    machine = MACHINE.model_copy(update={limit.key: 200.0})
+    assert more_of(machine, limit.name, 0.25) == machine.model_copy(update={limit.key: 250.0})
+
+
+@pytest.mark.parametrize("quantity", ["velocity", "acceleration", "jerk"])
+def test_more_of_a_limit_of_an_axis_is_of_that_axis_alone(quantity: str) -> None:
+    more = more_of(MACHINE, f"{quantity}.y", 0.25)
+    for name, axis in MACHINE.axes.items():
+        by = 1.25 if name == "y" else 1.0
+        assert more.axes[name] == axis.model_copy(update={quantity: by * getattr(axis, quantity)})

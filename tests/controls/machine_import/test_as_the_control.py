@@ -201,7 +201,10 @@ def test_what_is_not_set_has_the_control_s_default(tmp_path: Path) -> None:
     )
     assert found.machine.axes["a"].velocity == 1.0
     assert found.machine.axes["z"].velocity == 25.4
-    assert said(found, "MAX_VELOCITY of z, a is not set; LinuxCNC's default is 1 unit a second")
+    assert "MAX_VELOCITY of z, a is not set; LinuxCNC's default is 1 unit a second" in found.assumed
+    found = imported(tmp_path, MILL.replace("MAX_ACCELERATION = 12\nMIN", "MIN"))
+    assert said(found, "MAX_ACCELERATION of x")
+    assert said(found, " unit a second squared")
 
 
 def test_joints_move_the_axes_of_the_kinematics_not_of_the_coordinates(tmp_path: Path) -> None:

@@ -233,3 +233,13 @@ def test_a_control_character_in_a_value_that_a_note_quotes_is_not_in_the_machine
     assert any("\x1b" in sentence for sentence in found.assumed)
     assert "tr-vkins" in found.text
     assert machine_from_dict(tomllib.loads(found.text)) == found.machine
+
+
+@pytest.mark.parametrize(("frequency", "modes"), [("0.8", [0.8]), ("0", []), ("40", [40.0])])
+def test_marlin_shapes_any_frequency_but_0(tmp_path: Path, frequency: str, modes: list[float]) -> None:
+    """M593 F0 turns input shaping off."""
+    file = tmp_path / "marlin.txt"
+    file.write_text(f"M203 X250 Y240 Z5\nM201 X1300 Y1000 Z80\nM204 S700\nM593 F{frequency} D0.1\n")
+    found = import_machine(file).machine.modes
+    assert [mode.frequency for mode in found] == modes
+    assert [mode.damping for mode in found] == [0.1] * len(modes)

@@ -33,6 +33,7 @@ from planner.feedrate.constraints.user_limits import user_inside
 from planner.feedrate.sampling.samples import sample_path
 from planner.motion.limits_used import ratios
 from planner.verifier import verify
+from planner.verifier.excess import Kind
 from planner.verifier.filtered import filtered
 from planner.verifier.given import Given
 
@@ -123,6 +124,16 @@ def test_the_judge_finds_the_limit_used_up_at_the_speed_of_the_planner(name):
     assert largest(verdict, name) == pytest.approx(1.0, abs=CLOSE)
     units = {check.unit for key, check in verdict.limits.items() if key.split(".")[0] == name}
     assert units == {limit.unit}
+
+
+@pytest.mark.parametrize("name", ["feed", "velocity", "normal_acceleration", "acceleration", "jerk"])
+def test_spans_of_time_that_exceed_a_limit_are_of_that_limit(name):
+    machine = machine_with(velocity=90.0, acceleration=300.0, jerk=4e3, normal_acceleration=250.0)
+    toolpath, limit = circle().toolpath(machine), {limit.name: limit for limit in LIMITS}[name]
+    verdict = judge(steady(1.1 * capped(limit, on_grid(toolpath, machine))), toolpath, machine)
+    broken = {key.partition(".")[0] for key, check in verdict.limits.items() if check.broken}
+    assert name in broken
+    assert {one.name.partition(".")[0] for one in verdict.excesses if one.kind is Kind.LIMIT} == broken
 
 
 @pytest.mark.parametrize("limit", ROWS, ids=lambda limit: limit.name)

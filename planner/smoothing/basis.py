@@ -27,6 +27,20 @@ class Knots(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
+def put(out, begin, numbers):
+    """The numbers (n,) into out from `begin` on: with slices numba compiles the text of an error, too."""
+    for k in range(len(numbers)):
+        out[begin + k] = numbers[k]
+
+
+@njit(cache=True, error_model="numpy")
+def put_rows(out, begin, rows):
+    """`put` of rows (n, m)."""
+    for k in range(len(rows)):
+        put(out[begin + k], 0, rows[k])
+
+
+@njit(cache=True, error_model="numpy")
 def clamped(breaks):
     """Knots (n + 6,) of splines that begin and end at their first and last control point, from the spans'
     ends (S + 1,)."""

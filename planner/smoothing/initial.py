@@ -31,7 +31,7 @@ from planner.base.kernels import njit
 from planner.base.search import first_not_before
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side
-from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at
+from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at, put, put_rows
 from planner.smoothing.corridor import Corridor, part_of, run_corridor
 from planner.smoothing.sites import Sites, Splines, sites_of_run, used_share
 
@@ -252,11 +252,16 @@ def _lay(corridor, longest, distance):
     for q in range(runs):
         cut, points, own, out = parts[q]
         s, j = span_first[q], site_first[q]
-        outside[s : s + len(out)], fits[q] = out, not out.any()
-        breaks[s + q : s + q + len(cut)] = cut
-        control[s + DEGREE * q : s + DEGREE * q + len(points)] = points
-        end = j + len(own.span)
-        span[j:end], place[j:end], slide[j:end], radius[j:end] = own.span, own.place, own.slide, own.radius
-        weights[j:end], target[j:end], along[j:end] = own.weights, own.target, own.along
+        fits[q] = not out.any()
+        put(outside, s, out)
+        put(breaks, s + q, cut)
+        put_rows(control, s + DEGREE * q, points)
+        put(span, j, own.span)
+        put(place, j, own.place)
+        put(slide, j, own.slide)
+        put(radius, j, own.radius)
+        put_rows(weights, j, own.weights)
+        put_rows(target, j, own.target)
+        put_rows(along, j, own.along)
     sites = Sites(span, place, weights, target, along, slide, radius)
     return span_first, breaks, control, site_first, sites, outside, fits

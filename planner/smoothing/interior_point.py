@@ -26,7 +26,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.smoothing.basis import ORDER
+from planner.smoothing.basis import ORDER, put_rows
 from planner.smoothing.sites import Sites, site_distance
 
 
@@ -249,7 +249,7 @@ def minimise_in_corridor(problem, start, accuracy, iterations):
         for site in range(m):
             complementarity += z[site] * -g[site]
         residual = 0.0
-        step_1[:] = gradient
+        put_rows(step_1, 0, gradient)
         _add_gradient(sites, e, z, step_1)
         for i in range(n):
             if free[i]:
@@ -279,7 +279,7 @@ def minimise_in_corridor(problem, start, accuracy, iterations):
         # the cube of what the predictor leaves of the gap (Mehrotra 1992)
         mu = max((after / complementarity) ** 3, CENTRING * (1.0 - went)) * complementarity / m
         mu = max(mu, AIM * small / m)
-        step[:] = -gradient
+        put_rows(step, 0, -gradient)
         for site in range(m):
             # second order: z (g + slope + curvature) with the predictor's products
             dz = -z[site] + z[site] / -g[site] * slope_1[site]

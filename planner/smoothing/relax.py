@@ -14,7 +14,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.sizes import SIZES
 from planner.base.threads import in_parts
-from planner.smoothing.basis import DEGREE, Knots
+from planner.smoothing.basis import DEGREE, Knots, put, put_rows
 from planner.smoothing.certificate import certify
 from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.forms import third_derivative_energy
@@ -119,8 +119,9 @@ def _relax_run(run, start, goal):
                 closer, smaller = tighten_window(
                     window, sites, control, run.middle, ratio_site, goal.reach.overlap
                 )
-                control[lo:hi], radius[window.site : window.site_end] = closer, smaller
-            control[lo:hi] = _relaxed_window(window, run, control, radius, goal)
+                put_rows(control, lo, closer)
+                put(radius, window.site, smaller)
+            put_rows(control, lo, _relaxed_window(window, run, control, radius, goal))
             done = hi
         certificate = certify(run.corridor, run.knots, run.sites.place, control)
         ratio_site, left = certificate.site, certificate.left
@@ -144,8 +145,8 @@ def _relax(corridor, splines, runs, goal, own, found):
         start += (1.0 - AGAIN) * (middle - start)
         certified[q], moved, kept = _relax_run(run, start, goal)
         if certified[q]:
-            control[begin : begin + len(moved)] = moved
-        left[splines.span_first[q] : splines.span_first[q + 1]] = kept
+            put_rows(control, begin, moved)
+        put(left, splines.span_first[q], kept)
 
 
 def relax(corridor: Corridor, splines: Splines, runs: SplineRuns, goal: Goal) -> Relaxed:

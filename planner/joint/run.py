@@ -53,6 +53,8 @@ SHARP = 0.25
 # An arc or a curve with a radius below so many times its budget [-] is passed (`TubeRun.passed`;
 # `python -m benchmarks.net.ablation ROWS --net NET --without PASSED`).
 PASSED = 2.0
+MARK = np.pi / 8  # on an arc a point is to be passed every so often [rad]
+TOGETHER = 2.0  # vertices may be passed together that are so many tolerances apart [-]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -163,6 +165,19 @@ class TubeRun:
         feed = np.minimum(self.feed, np.linalg.norm(self.velocity))
         change = np.sign(np.diff(feed, prepend=feed[0]))
         return -np.where(change != 0.0, change, word_change(self.word))
+
+    @cached_property
+    def marks(self) -> Array:
+        """(R,) in how many parts of equal length legs are, whose ends are to be passed in order: arcs of `MARK` at most."""
+        turned = np.where(self.curve < 0, np.abs(self.rate) * self.length, 0.0)
+        return np.maximum(np.ceil(turned / MARK - STRAIGHT), 1).astype(np.int64)
+
+    @cached_property
+    def crowded(self) -> Array:
+        """(R,) whether what is to be passed next, before or behind the vertex where each leg begins, is so near that both may
+        be passed together."""
+        apart = self.length / self.marks
+        return np.minimum(apart, np.roll(apart, 1)) <= TOGETHER * self.vertex_budget[:-1]
 
     @cached_property
     def passed(self) -> Array:

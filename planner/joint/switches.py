@@ -7,6 +7,11 @@ On the step of a time h the way from the vertex is p = d + V x + A x^2 + J x^3 w
 a place is nearest within a step where f goes from below 0 to above. Its zeros lie between those of its derivative, theirs
 between those of the next one. Steps are looked at from the vertex on, on the faster leg and on the slower one, so that f is
 above 0 where a motion goes away from it; where the feed falls that is backwards in time.
+
+Vertices that are nearer to each other than the tolerance may be passed together, a short block with an F of its own as well as
+the points of a narrow arc, of which one is passed every `MARK`. There the motion is at all of them in order, at the places
+that are together nearest (least sum of squares); of those that would be out of order that is one place, nearest to their mean, which
+stands for the vertex. Between the places of a slow block no step may be faster than its F, whichever leg it belongs to.
 """
 
 from typing import NamedTuple
@@ -15,13 +20,15 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.joint.run import TubeRun
+from planner.joint.run import TOGETHER, TubeRun
 
 DEGREE = 5  # of f
 HALVED = 60  # a zero is between two places that are halved so often [-]
 AWAY = 1e-12  # rounding of distances to a vertex, in tolerances and of the places themselves [-]
-SAME = 1e-9  # rounding of a feed, as a share of it [-]
+SAME = 1e-9  # rounding of a feed, as a share of it, and of a place, in steps [-]
 FURTHER = 1.002  # by how much more than was missed a node is to be further [-]
+# Points are looked at that are so many tolerances from a vertex [-], and so many at most before and behind it.
+LOOKED_AT, LOOKED_MOST = 4.0, 16
 
 
 class Beside(NamedTuple):
@@ -130,6 +137,127 @@ def _least(vertex, begin, jerk, h, way):
     return best, at, low
 
 
+@njit(cache=True, error_model="numpy")
+def _on_step(point, state, jerk, h, reach, room):
+    """Squared distance of a point from a step that begins with `state` (3, A), and the share of the step where it is nearest;
+    not looked for where that is farther than `reach`; room: p and v (2, A), and 7 places."""
+    (d, v), places, off, run = room[0], room[1], 0.0, 0.0
+    for k in range(len(point)):
+        d[k], v[k] = state[0, k] - point[k], state[1, k]
+        off += d[k] * d[k]
+        run += abs(h * v[k]) + h * h * (abs(state[2, k]) + abs(h * jerk[k]))
+    if np.sqrt(off) - run > reach:
+        return off, 0.0
+    square, share, _ = _nearest(d, v, state[2], jerk, h, places)
+    return square, share
+
+
+@njit(cache=True, error_model="numpy")
+def places_in_order(points, state, jerk, h, reach):
+    """Where N steps are at the points (P, A) in order: at their places (P,), in steps; and the points (P, A) that stand for
+    them, means of those that are passed together."""
+    count, steps = len(points), len(h)
+    cost, share = np.zeros(steps), np.zeros((count, steps))
+    better = np.zeros((count, steps), np.bool_)
+    room = np.zeros((2, points.shape[1])), np.zeros(DEGREE + 2)
+    for i in range(count):
+        least = np.inf
+        for n in range(steps):
+            square, share[i, n] = _on_step(points[i], state[n], jerk[n], h[n], reach, room)
+            square += cost[n]
+            better[i, n] = square < least
+            cost[n] = least = min(least, square)
+    step, n = np.zeros(count, np.int64), steps - 1
+    for i in range(count - 1, -1, -1):
+        while not better[i, n]:
+            n -= 1
+        step[i] = n
+    place, group, stands = np.zeros(count), np.ones(count, np.int64), points.copy()
+    for i in range(count):
+        place[i], n = step[i] + share[i, step[i]], i
+        while n > 0 and place[n] < place[n - 1]:
+            n -= group[n - 1]
+            for m in range(n, i + 1):
+                for k in range(points.shape[1]):
+                    stands[m, k] = points[n : i + 1, k].mean()
+            here = step[i]
+            square, at = _on_step(stands[i], state[here], jerk[here], h[here], np.inf, room)
+            for way in (-1, 1):
+                while 0 <= here + way < steps:
+                    m = here + way
+                    other, there = _on_step(stands[i], state[m], jerk[m], h[m], np.inf, room)
+                    if other >= square:
+                        break
+                    here, square, at = m, other, there
+            place[n : i + 1], step[n : i + 1], group[n : i + 1] = here + at, here, i + 1 - n
+    return place, stands
+
+
+@njit(cache=True, error_model="numpy")
+def _fast_steps(state, jerk, h, begin, end, feed):
+    """(N,) which of the steps run faster than `feed` between the places `begin` and `end`, in steps."""
+    found, axes = np.zeros(len(h), np.bool_), jerk.shape[1]
+    for n in range(len(h)):
+        low, high = max(begin - n, 0.0), min(end - n, 1.0)
+        if high - low <= SAME:
+            continue
+        most, t = 0.0, low * h[n]
+        span = high * h[n] - t
+        for x in (0.0, 0.5, 1.0):  # Bezier ordinates of the velocity there
+            square = 0.0
+            for k in range(axes):
+                v, a = (
+                    state[n, 1, k] + t * (state[n, 2, k] + t * jerk[n, k] / 2.0),
+                    state[n, 2, k] + t * jerk[n, k],
+                )
+                square += (v + span * x * (a + (span * jerk[n, k] / 2.0 if x == 1.0 else 0.0))) ** 2
+            most = max(most, square)
+        found[n] = np.sqrt(most) > feed * (1.0 + SAME)
+    return found
+
+
+def _together(run: TubeRun, r: int) -> tuple[FloatArray, Array]:
+    """(P, A) the points around the vertex where leg r begins that may be passed together with it, in order, and (P,) the
+    legs that begin there, -1 of points on arcs."""
+    vertex, reach = run.vertex[r], LOOKED_AT * run.vertex_budget[r]
+    found = [(vertex, r)]
+    for way in (-1, 1):
+        leg, most = r - 1 if way < 0 else r, len(found) + LOOKED_MOST
+        while 0 <= leg < len(run) and len(found) < most:
+            x = run.length[leg] * np.linspace(0.0, 1.0, run.marks[leg] + 1)
+            points = run.points(np.full(len(x), leg), x)
+            of = np.append(np.append(leg, np.full(len(x) - 2, -1)), leg + 1)
+            points, of = (points[-2::-1], of[-2::-1]) if way < 0 else (points[1:], of[1:])
+            near = (np.linalg.norm(points - vertex, axis=1) <= reach) & (of != 0) & (of != len(run))
+            until = len(near) if near.all() else int(near.argmin())
+            more = list(zip(points[:until], of[:until].tolist(), strict=True))
+            found = more[::-1] + found if way < 0 else found + more
+            if until < len(near):
+                break
+            leg += way
+    return np.array([point for point, _ in found]), np.array([leg for _, leg in found])
+
+
+def _too_fast(
+    run: TubeRun, r: int, leg: Array, h: FloatArray, state: FloatArray, jerk: FloatArray
+) -> tuple[Array, FloatArray]:
+    """The nodes of N steps that are beyond the vertex, where leg r begins, on the slower side, and run at more than its F
+    meanwhile; and the point (A,) that stands for the vertex (module text)."""
+    points, of = _together(run, r)
+    legs = of[of >= 0]
+    steps = np.arange(*np.searchsorted(leg, [legs[0] - 1, legs[-1] + 1]))
+    part = state[steps], jerk[steps], h[steps]
+    place, stands = places_in_order(points, *part, TOGETHER * float(run.vertex_budget[r]))
+    at, falls = int(np.flatnonzero(of == r)[0]), run.switch[r] > 0.0
+    edges = np.concatenate([[-np.inf], place[of >= 0], [np.inf]])  # of the legs from legs[0] - 1 on
+    fast = np.zeros(len(steps), dtype=bool)
+    for leg_on in range(r, legs[-1] + 1) if falls else range(legs[0] - 1, r):
+        begin, end = edges[leg_on + 1 - legs[0] :][:2]
+        fast |= _fast_steps(*part, begin, end, float(run.feed[leg_on]))
+    fast &= (leg[steps] < r) == falls
+    return steps[fast] + int(falls), stands[at]
+
+
 def switches_missed(
     run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, jerk: FloatArray, part: slice = slice(None)
 ) -> Beside | None:
@@ -147,6 +275,13 @@ def switches_missed(
     for k, node in enumerate(begins):
         r = int(leg[node])
         if run.switch[r] == 0.0:
+            continue
+        if run.crowded[r] and not run.word.shape[1]:
+            wrong, at = _too_fast(run, r, leg, h, state, jerk)
+            if len(wrong):
+                wrong = np.append(wrong, node)
+                wrong = wrong[(wrong > begin) & (wrong < end)]
+                rows.leg[wrong], rows.at[wrong] = r, at
             continue
         vertex, way = run.vertex[r], -run.switch[r]
         # steps outwards, the nodes where they begin: backwards on the leg before the vertex

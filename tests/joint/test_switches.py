@@ -10,7 +10,7 @@ from starts import MACHINE, begun_on
 from planner.geometry.build import toolpath_from_program
 from planner.joint.own import TubeOwn
 from planner.joint.run import tube_runs_of
-from planner.joint.switches import switches_missed
+from planner.joint.switches import places_in_order, switches_missed
 from planner.nc.reader import parse_program
 
 RADIUS = 8.0  # [mm]
@@ -157,3 +157,47 @@ def test_where_a_faster_leg_comes_nearer_the_search_gets_rows_beside_the_vertex(
     p, v, a = found.steps.position, found.steps.velocity, found.steps.acceleration
     state = np.concatenate([np.stack([p, v, a], axis=1), guess.state[-1:]])
     assert switches_missed(run, guess.leg, found.steps.h, state, found.steps.jerk) is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_points_passed_together_have_the_least_sum_of_squares_in_order(seed):
+    """Random motions past random points, against the best of all places in order, 400 on every step; those that are together have one
+    place, nearest to their mean."""
+    random = np.random.default_rng(seed)
+    ahead = np.array([1.0, 0.3])
+    nodes = np.linspace(0.0, 3.0, 9)[:, None] * ahead + 0.05 * random.normal(size=(9, 2))
+    points = np.sort(random.uniform(0.2, 2.8, 7))[:, None] * ahead + 0.4 * random.normal(size=(7, 2))
+    _, h, state, jerk = motion(np.zeros(8, dtype=int), nodes)
+    place, stands = places_in_order(points, state, jerk, h, np.inf)
+    assert (np.diff(place) >= 0.0).all()
+
+    def at(places):
+        n = np.minimum(places.astype(int), len(h) - 1)
+        t = ((places - n) * h[n])[:, None]
+        return state[n, 0] + t * (state[n, 1] + t * (state[n, 2] / 2 + t * jerk[n] / 6))
+
+    fine = np.arange(0, 8 * 400 + 1) / 400
+    apart = ((at(fine)[None] - points[:, None]) ** 2).sum(axis=2)
+    least = np.zeros(len(fine))
+    for row in apart:
+        least = np.minimum.accumulate(least + row)
+    found = ((at(place) - points) ** 2).sum()
+    assert found <= least[-1] + 1e-4
+    for one in np.unique(place):
+        group = place == one
+        assert stands[group] == pytest.approx(np.tile(points[group].mean(axis=0), (group.sum(), 1)))
+
+
+def test_a_fast_block_before_a_slow_one_within_the_tolerance_is_not_kept():
+    """A slow block between two fast ones, with a vertex between them that is nearer than the tolerance: run at the larger F up to the
+    node of the slow one's end, though it is on the slow block from its beginning on, the motion is missed; at its F it is not."""
+    text = "G21 G17 G90 G64 P0.2\nG1 X3 F6000\nG1 X3.1 F3000\nG1 X3.4 F600\nG1 X6 F6000\nM2\n"
+    (run,) = tube_runs_of(toolpath_from_program(parse_program(text), MACHINE), MACHINE)
+    assert run.crowded[1:].all()
+    leg = np.repeat([0, 1, 2, 3], [6, 1, 1, 6])
+    ends = np.concatenate([np.linspace(0.0, 3.2, 7), [3.35, 3.4], np.linspace(3.5, 6.0, 6)])
+    points = ends[:, None] * np.array([1.0, 0.0])[: len(run.axis)]
+    missed = switches_missed(run, *motion(leg, points, 40.0))
+    assert missed is not None
+    assert (missed.leg[leg < 2] > 0).any()
+    assert switches_missed(run, *motion(leg, points, 9.0)) is None

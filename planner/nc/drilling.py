@@ -52,6 +52,7 @@ _STEPS = {
 }
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _DEEP, _BACK_BORE, _BY_HAND = 830, 870, 880  # G83, G87, G88
+_PECK_ODD = 10.0  # times the depth of a hole: a longer peck is most likely in other units
 _PER_HOLE = 16  # steps of a hole without pecks, at most
 _PER_PECK = 3  # down, out and back in
 _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [programmed units]
@@ -156,6 +157,9 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
             _to(state, table, block.line, step)
         here[c] = hole.retract
     _say(state, block, findings)
+    if state.fanuc and "Q" in block.value and hole.peck > _PECK_ODD * (hole.clear - hole.bottom):
+        text = f"Q{hole.peck:g} is one peck to the bottom; on controls where it is in least increments set [dialect] least_increment"
+        findings.assume(text, block.line, block.at["Q"])
 
 
 def _check_words(state: State, block: Block, words: dict[str, float], findings: Findings) -> None:

@@ -99,3 +99,9 @@ def test_air_and_questions_of_haas_are_no_printers() -> None:
     program = parse_program(HEAD + "M83\nG4 P500\nM84\nM109 P501 (SIZE?)\nG1 X3.\nM30", MACHINE)
     assert program.dwell.max() == 0.5
     assert not any("3-D printers run it" in text for text in program.assumptions)
+
+
+@pytest.mark.parametrize(("peck", "said"), [("Q2000", True), ("Q2.", False), ("Q20.", False)])
+def test_a_peck_far_beyond_the_hole_is_said(peck: str, said: bool) -> None:
+    program = parse_program(f"{HEAD}G0 Z9.\nG83 X1. Z-5. R1. {peck} F100\nG80\nM30", MACHINE)
+    assert any(f"line 4: {peck} is one peck to the bottom" in text for text in program.assumptions) == said

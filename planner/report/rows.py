@@ -40,7 +40,7 @@ def plan_rows(plan: Plan) -> Rows:
             free = np.isfinite(plan.machine.powers(plan.toolpath.axes)).any()
             times += "; without the limits of drive power" if free else ""
             rows.append(("stopping at every block", times))
-        if plan.least_time is not None:
+        if plan.least_time:  # 0 where the tolerance allows to stay where one is
             above = 100.0 * (time / plan.least_time - 1.0)
             said = f"{plan.least_time:.4f} s or more, certified; this motion is {above:.2g} % above that"
             rows.append(("fastest possible", said))

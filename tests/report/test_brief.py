@@ -15,6 +15,7 @@ from planner.machine import ControlData, load_machine
 from planner.nc.reader import parse_program
 from planner.planning.job.beside import Beside
 from planner.report.brief import brief_rows, control_of, limit_text, tool_times
+from planner.report.rows import plan_rows
 from planner.report.summary import summary
 from planner.report.tables import brief_table
 from planner.report.units import UNITS, units_of
@@ -119,3 +120,17 @@ def test_what_may_be_another_part_is_told_first(job: str) -> None:
     )
     first = text(brief_table(plan, UNITS["mm"])).splitlines()[0]
     assert any(words in first for words in ("no diameter", "no offset", "the part's largest extent")), first
+
+
+def test_a_bound_of_nothing_is_not_told() -> None:
+    """Within a tolerance larger than the part nothing has to move."""
+    made = planner.plan(
+        planner.read_program(text="G1 X10 F600\nY10\nX0\nY0\n"), tolerance=20.0, method="stop"
+    )
+    assert made.least_time == 0.0
+    assert "fastest possible" not in dict(plan_rows(made))
+
+
+def test_joints_are_named_as_such() -> None:
+    assert limit_text("acceleration.joint z") == "acceleration of joint Z"
+    assert limit_text("jerk.x") == "jerk of X"

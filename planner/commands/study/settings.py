@@ -137,6 +137,8 @@ def parse_value(name: str, text: str, machine: Machine, tolerance: float) -> flo
             raise InputError(f"{name}={text}: a percentage of what? {what}; write a number")
         relative = found[0][0] in "+-"
         value = present * (number / 100.0 + (1.0 if relative else 0.0))
+    elif found[0][0] == "+":
+        raise InputError(f"{name}={text}: changes are in per cent, as {found[0]}%; a value has no sign")
     elif unit and unit not in units:
         near = difflib.get_close_matches(unit, [each for each in units if each], n=1)
         hint = f" (did you mean '{near[0]}'?)" if near else ""

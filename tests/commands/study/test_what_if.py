@@ -71,6 +71,7 @@ def test_names_and_units(text: str, name: str, value: float) -> None:
         ("tolerance=-100%", "must be positive"),
         ("tolerance=1e999", "must be positive and finite"),
         ("feed_max=+10%", "a percentage of what?"),
+        ("x.jerk=+50", "changes are in per cent, as +50%"),
         ("tolerance", "write a name and a value"),
     ],
 )

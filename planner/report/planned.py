@@ -40,6 +40,7 @@ _MOTION = (
 # Where more than this share of the blocks last less than a period, a control is better off with the original
 # [-].
 MANY_SHORT = 0.5
+_CAPPED = "planned.ngc: a line that a feed cap holds for a part of it has the cap for all of it"
 # A path that was written with seven decimals and read back is off by less than this [mm].
 SAME_PATH = 1e-6
 
@@ -116,13 +117,16 @@ def _as_programmed(feeds: FloatArray, toolpath: Toolpath) -> FloatArray:
 def _notes(plan: Plan, planned: PlannedBlocks, text: bytes) -> list[str]:
     if own_text(plan.program) == text:
         return ["planned.ngc equals the program: no block is planned slower than its F word"]
+    parts = (np.diff(plan.program.line) == 0) & (np.diff(plan.program.feed) != 0.0)
+    notes = [_CAPPED] if plan.program.reading.caps and parts.any() else []
     lasting = planned.duration[~plan.toolpath.rapid]
     short = int((lasting < plan.machine.dt).sum())
     if short <= MANY_SHORT * len(lasting):
-        return []
+        return notes
     return [
+        *notes,
         f"planned.ngc: {short:,} of {len(lasting):,} blocks last less than a period of {plan.machine.dt * 1e3:g} ms; a control that "
-        "joins or looks ahead over such blocks runs the original faster, because F words can only slow it down"
+        "joins or looks ahead over such blocks runs the original faster, because F words can only slow it down",
     ]
 
 

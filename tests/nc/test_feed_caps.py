@@ -225,6 +225,18 @@ def test_what_cannot_be_capped_is_refused(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.parametrize(("end", "said"), [("5", True), ("10", False)])
+def test_lines_that_a_cap_holds_in_part_are_told(end: str, said: bool, tmp_path: Path) -> None:
+    """An F word is of a line: planned.ngc has the cap for all of it."""
+    (tmp_path / "job.ngc").write_text("G21 G90 F900\nG1 X10\nY10\nM2\n")
+    (tmp_path / "caps.csv").write_text(f"from_mm,to_mm,feed\n0,{end},600\n")
+    out = tmp_path / "out"
+    done = run(
+        "plan", tmp_path / "job.ngc", "--feed-caps", tmp_path / "caps.csv", "--method", "kinematic", "-o", out
+    )
+    assert ("has the cap for all of it" in done.output) is said
+
+
 def test_programs_under_caps_are_exported_from_planned_ngc(tmp_path: Path) -> None:
     (tmp_path / "job.ngc").write_text(JOB)
     (tmp_path / "caps.csv").write_text("line,feed\n4,600\n")

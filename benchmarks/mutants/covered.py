@@ -94,7 +94,8 @@ class Covered:
             own = {test for at in where for test in seen.get(at, [])}
         files = {name for name in own if "::" not in name}
         known = [name for name in self.seconds if name in own or name.partition("::")[0] in files]
-        changed = [name for name in room if self.digests.get(name) != digest(root / name)]
+        there = [name for name in room if (root / name).is_file()]  # in the copy, which may be older
+        changed = [name for name in there if self.digests.get(name) != digest(root / name)]
         if anywhere:
             known = [name for name in self.seconds if name.partition("::")[0] in room]
         rank = {name: at for at, name in enumerate(room)}

@@ -304,9 +304,6 @@ class _Search:
             beside.add(missed)
             return np.zeros((hi - lo, 1 + len(run.laws)))
         needed = not self.settings.stays and self.kept[lo:hi].any()
-        # rows about places of other motions may ask for too much
-        if needed and (beside.leg >= 0).any() and h.sum() > self._begun.h[lo:hi].sum():
-            return np.ones((hi - lo, 1 + len(run.laws)))
         if needed or self.settings.smooth or h.sum() < guess.h[lo:hi].sum():
             guess.place[lo:hi, :3] = along
             guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk

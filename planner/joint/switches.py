@@ -259,7 +259,12 @@ def _too_fast(
 
 
 def switches_missed(
-    run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, jerk: FloatArray, part: slice = slice(None)
+    run: TubeRun,
+    leg: Array,
+    h: FloatArray,
+    state: FloatArray,
+    jerk: FloatArray,
+    part: slice = slice(None),
 ) -> Beside | None:
     """Where N steps run at the larger of two feeds while they are still to be nearer to the vertex between them, in the
     steps `part`, the nodes inside it that get a row for it: that of the vertex; those of the faster leg that are nearer, and
@@ -276,37 +281,54 @@ def switches_missed(
         r = int(leg[node])
         if run.switch[r] == 0.0:
             continue
-        if run.crowded[r] and not run.word.shape[1]:
+        legs = (np.arange(edges[k], node), np.arange(node, edges[k + 2]))
+        found = _passed_late(run, r, legs, h, state, jerk, (begin, end), rows)
+        if not found and run.crowded[r] and not run.word.shape[1]:
             wrong, at = _too_fast(run, r, leg, h, state, jerk)
             if len(wrong):
                 wrong = np.append(wrong, node)
                 wrong = wrong[(wrong > begin) & (wrong < end)]
                 rows.leg[wrong], rows.at[wrong] = r, at
-            continue
-        vertex, way = run.vertex[r], -run.switch[r]
-        # steps outwards, the nodes where they begin: backwards on the leg before the vertex
-        sides = (np.arange(node, edges[k + 2]), 0), (np.arange(node - 1, edges[k] - 1, -1), 1)
-        (fast, more), (slow, less) = sides if way > 0.0 else sides[::-1]
-        inner = fast + more
-        nearest, at, low = _least(vertex, state[inner], jerk[fast], h[fast], way)
-        other, _, _ = _least(vertex, state[slow + less], jerk[slow], h[slow], -way)
-        other -= AWAY * (run.vertex_budget[r] + np.abs(vertex).max())
-        if nearest >= other or not begin <= fast[at] < end:
-            continue
-        until = slice(0, at + 1)
-        if _slow(run, r, state[inner[until]], state[fast[until] + 1 - more], way * h[fast[until]]):
-            continue
-        off, v = state[inner, 0] - vertex, way * state[inner, 1]
-        far, away, speed = np.linalg.norm(off, axis=1), (off * v).sum(axis=1), np.linalg.norm(v[at])
-        wrong = inner[(far < other) | ((away < 0.0) & (far <= run.vertex_budget[r]))]
-        rows.leg[wrong[wrong < end]], rows.at[wrong[wrong < end]] = r, vertex
-        if low < 0.0 <= away[at] and speed > 0.0 and inner[at] < end:
-            further = FURTHER * (away[at] - low / h[fast[at]]) / speed
-            rows.leg[inner[at]], rows.at[inner[at]] = r, vertex + further * v[at] / speed
-        if node < end and rows.leg[node] < 0:
-            rows.leg[node], rows.at[node] = r, vertex
     rows.leg[: begin + 1] = -1
     return Beside(*(column[part] for column in rows)) if (rows.leg[part] >= 0).any() else None
+
+
+def _passed_late(
+    run: TubeRun,
+    r: int,
+    legs: tuple[Array, Array],
+    h: FloatArray,
+    state: FloatArray,
+    jerk: FloatArray,
+    part: tuple[int, int],
+    rows: Beside,
+) -> bool:
+    """Whether steps of the faster one of the `legs` before and behind the vertex where leg r begins come nearer to it than
+    those of the slower one, in the `part`: then `rows` are set, as `switches_missed` says."""
+    (before, behind), (begin, end) = legs, part
+    node, vertex, way = int(behind[0]), run.vertex[r], -run.switch[r]
+    # steps outwards, the nodes where they begin: backwards on the leg before the vertex
+    sides = (behind, 0), (before[::-1], 1)
+    (fast, more), (slow, less) = sides if way > 0.0 else sides[::-1]
+    inner = fast + more
+    nearest, at, low = _least(vertex, state[inner], jerk[fast], h[fast], way)
+    other, _, _ = _least(vertex, state[slow + less], jerk[slow], h[slow], -way)
+    other -= AWAY * (run.vertex_budget[r] + np.abs(vertex).max())
+    if nearest >= other or not begin <= fast[at] < end:
+        return False
+    until = slice(0, at + 1)
+    if _slow(run, r, state[inner[until]], state[fast[until] + 1 - more], way * h[fast[until]]):
+        return False
+    off, v = state[inner, 0] - vertex, way * state[inner, 1]
+    far, away, speed = np.linalg.norm(off, axis=1), (off * v).sum(axis=1), np.linalg.norm(v[at])
+    wrong = inner[(far < other) | ((away < 0.0) & (far <= run.vertex_budget[r]))]
+    rows.leg[wrong[wrong < end]], rows.at[wrong[wrong < end]] = r, vertex
+    if low < 0.0 <= away[at] and speed > 0.0 and inner[at] < end:
+        further = FURTHER * (away[at] - low / h[fast[at]]) / speed
+        rows.leg[inner[at]], rows.at[inner[at]] = r, vertex + further * v[at] / speed
+    if node < end and rows.leg[node] < 0:
+        rows.leg[node], rows.at[node] = r, vertex
+    return True
 
 
 def _slow(run: TubeRun, r: int, begin: FloatArray, end: FloatArray, h: FloatArray) -> bool:

@@ -40,7 +40,7 @@ FREEZE, FROZEN = 2.5, 1e8
 # The time has settled when it changes by no more than this share of the complementarity asked for in so many
 # iterations in a row, and at last after so many at that complementarity: frozen as soon as that is reached,
 # motions end slower.
-STILL, STILL_FOR, CLOSE_FOR = 0.1, 2, 40
+STILL, STILL_FOR, CLOSE_FOR = 0.3, 2, 40
 MELT = 0.8  # by which prox falls in each of these iterations, as far as `Tuning.least` lets it [-]
 # Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: behind
 # a short step they lead astray.

@@ -117,7 +117,8 @@ def _as_programmed(feeds: FloatArray, toolpath: Toolpath) -> FloatArray:
 def _notes(plan: Plan, planned: PlannedBlocks, text: bytes) -> list[str]:
     if own_text(plan.program) == text:
         return ["planned.ngc equals the program: no block is planned slower than its F word"]
-    parts = (np.diff(plan.program.line) == 0) & (np.diff(plan.program.feed) != 0.0)
+    line, feed = plan.program.line, plan.program.feed  # inf on rapids
+    parts = (line[1:] == line[:-1]) & (feed[1:] != feed[:-1])
     notes = [_CAPPED] if plan.program.reading.caps and parts.any() else []
     lasting = planned.duration[~plan.toolpath.rapid]
     short = int((lasting < plan.machine.dt).sum())

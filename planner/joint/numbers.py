@@ -10,6 +10,10 @@ from planner.joint.run import TubeRun
 
 # The tolerance is narrowed by this fraction [-], so that rounding stays inside it.
 ROUNDING = 1e-4
+# Chords that pass a place at another share u than the middle are off p + 4 u (1 - u) (dt^2/8) a by |jerk| dt^3/48 at most (Peano's
+# kernel of that, at the middle). The tolerance is narrowed by that too, but by no more than this fraction [-]: what is left
+# of it at long periods is found when the motion is looked at.
+CHORDS = 1e-3
 # Weights of what the motion does for no time, against the time [-]: of the squares of all jerks, as shares of
 # their limits, on steps that run at the programmed feed and on all others; and of half the square of how far
 # nodes are from their leg, as a share of the tolerance. So jerk is small, and positions are near the path,
@@ -33,6 +37,12 @@ def jerk_weights(run: TubeRun, leg: Array, velocity: FloatArray, least: float) -
     return np.maximum(np.where(held, SMOOTH_AT_FEED, SMOOTH), least)
 
 
+def narrowed(run: TubeRun, room: FloatArray) -> FloatArray:
+    """Distances `room` [mm], narrowed by `ROUNDING` and for chords."""
+    by_jerk = run.chord and float(np.linalg.norm(run.jerk)) * run.chord**3 / 6.0
+    return room * (1.0 - ROUNDING) - np.minimum(by_jerk, CHORDS * room)
+
+
 def step_numbers(
     run: TubeRun, guess: Guess, mean_step: FloatArray, length: float, speed: float, acc: float
 ) -> FloatArray:
@@ -44,10 +54,10 @@ def step_numbers(
     length, speed, acc : units that the numbers are in [mm], [mm/s], [mm/s2]
     """
     leg, last = guess.leg, np.flatnonzero(np.diff(guess.leg))  # last: steps that end at a vertex
-    room, feed = run.room[leg] * (1.0 - ROUNDING), run.feed[leg]
+    room, feed = narrowed(run, run.room[leg]), run.feed[leg]
     room_end, feed_end = room.copy(), feed.copy()
     beside = np.minimum(run.room[:-1], run.room[1:])
-    room_end[last] = np.minimum(run.vertex_budget[1:-1], beside) * (1.0 - ROUNDING)
+    room_end[last] = narrowed(run, np.minimum(run.vertex_budget[1:-1], beside))
     feed_end[last] = np.minimum(feed[last], feed[last + 1])
     fastest = np.linalg.norm(run.velocity)  # instead of inf, where nothing else limits
     strongest = 2.0 * np.linalg.norm(run.acceleration)

@@ -13,7 +13,7 @@ from planner.joint.laws import LawRows
 from planner.joint.legs import LegFormulas
 from planner.joint.nlp import LONGER
 from planner.joint.normal_rows import turns_far
-from planner.joint.numbers import CENTRE, ROUNDING, jerk_weights, pace
+from planner.joint.numbers import CENTRE, jerk_weights, narrowed, pace
 from planner.joint.row_kinds import StepLimits
 from planner.joint.run import TubeRun
 from planner.joint.switches import Beside, no_rows_beside
@@ -133,11 +133,11 @@ def _limits(
     leg = cut.leg[lo:hi]
     before = cut.leg[lo - 1] if lo else -1
     at_vertex = np.diff(leg, prepend=before) > 0
-    room = run.room[leg] * (1.0 - ROUNDING)
+    room = narrowed(run, run.room[leg])
     room_node = room.copy()
     vertex = leg[at_vertex & (leg > 0)]
     at_both = np.minimum(run.room[vertex - 1], run.room[vertex])
-    room_node[at_vertex & (leg > 0)] = np.minimum(run.vertex_budget[vertex], at_both) * (1.0 - ROUNDING)
+    room_node[at_vertex & (leg > 0)] = narrowed(run, np.minimum(run.vertex_budget[vertex], at_both))
     fastest, strongest = np.linalg.norm(run.velocity), np.linalg.norm(run.acceleration)
     feed = np.minimum(run.feed[leg], fastest)
     inside = 1.0 - NARROWED * narrow[0]

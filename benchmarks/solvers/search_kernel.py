@@ -4,7 +4,7 @@
 
 Every window that a plan asks for is written down. The longest ones are then solved again, processor seconds, the least of some
 passes: on single numbers; four of the same side by side in lanes, where none waits for another; and one of
-these groups with a single window in it: NaN where none can be in lanes (joint/window_solver.py). Reading
+these groups with a single window in it; none where none can be in lanes (joint/window_solver.py). Reading
 windows into the kernel's memory and back is in all of it.
 """
 
@@ -133,7 +133,7 @@ def main() -> None:
             str(row["axes"]),
             f"{row['windows']:,}",
             f"{row['steps']:,}",
-            *(f"{row[f'us_{kind}']:.2f}" for kind in ("single", "lanes", "alone")),
+            *("-" if math.isnan(us := row[f"us_{kind}"]) else f"{us:.2f}" for kind in ("single", "lanes", "alone")),
         ]
         for row in rows
     ]

@@ -13,7 +13,7 @@ ROUNDING = 1e-4
 # Chords that pass a place at another share u than the middle are off p + 4 u (1 - u) (dt^2/8) a by |jerk| dt^3/48 at most (Peano's
 # kernel of that, at the middle). The tolerance is narrowed by that too, but by no more than this fraction [-]: what is left
 # of it at long periods is found when the motion is looked at.
-CHORDS = 1e-3
+CHORDS = 1e-2
 # Weights of what the motion does for no time, against the time [-]: of the squares of all jerks, as shares of
 # their limits, on steps that run at the programmed feed and on all others; and of half the square of how far
 # nodes are from their leg, as a share of the tolerance. So jerk is small, and positions are near the path,

@@ -1,0 +1,70 @@
+"""What jerk adds to chords that pass a place off their middle: a bound, that it is attained, and what comes of it."""
+
+import numpy as np
+import pytest
+
+from benchmarks.jobs import problems
+from planner.joint import numbers
+from planner.machine import load_machine
+from planner.planning.job.trace import Trace
+from planner.planning.methods.optimal import OptimalMethod
+
+H = 0.002  # a period [s]
+CELLS = 400
+
+
+def off(jerk, share):
+    """How far the chord of a motion of so much jerk (`CELLS`,) in a period is from p + 4 u (1 - u) (h^2/8) a at the share u."""
+    t = np.linspace(0.0, H, CELLS + 1)
+    h = np.diff(t)
+    state = np.zeros((CELLS + 1, 3))
+    for k, j in enumerate(jerk):
+        p, v, a = state[k]
+        state[k + 1] = (
+            p + h[k] * (v + h[k] * (a / 2 + h[k] * j / 6)),
+            v + h[k] * (a + h[k] * j / 2),
+            a + h[k] * j,
+        )
+    at = round(share * CELLS)
+    u = at / CELLS
+    chord = (1 - u) * state[0, 0] + u * state[-1, 0]
+    return abs(chord - state[at, 0] - u * (1 - u) * H**2 / 2 * state[at, 2])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_jerk_moves_a_chord_by_no_more_than_its_bound(seed):
+    rng = np.random.default_rng(seed)
+    most = 5e4
+    jerk = most * rng.choice([-1.0, 1.0], 4).repeat(CELLS // 4) * rng.uniform(0.5, 1.0)
+    bound = most * H**3 / 48
+    assert all(off(jerk, share) <= bound * (1 + 1e-9) for share in (0.1, 0.25, 0.5, 0.7, 0.95))
+
+
+def test_jerk_that_turns_over_at_the_middle_attains_it():
+    most = 5e4
+    jerk = np.where(np.arange(CELLS) < CELLS // 2, -most, most)
+    assert off(jerk, 0.5) == pytest.approx(most * H**3 / 48, rel=1e-6)
+
+
+def wave(blocks, seed):
+    """Short blocks along a wave, a little beside it."""
+    rng = np.random.default_rng(seed)
+    x = 0.25 * np.arange(blocks + 1)
+    y = np.sin(2 * np.pi * x / 5.0) + rng.normal(size=blocks + 1) * 0.02
+    points = np.round(np.stack([x, y, rng.normal(size=blocks + 1) * 0.03], axis=1), 3)
+    return problems.polyline(points - points[0])
+
+
+def test_at_two_milliseconds_what_is_found_passes_as_it_is(monkeypatch):
+    """And is not run slower in places, which costs more than a tenth of the time here."""
+    program, machine = wave(60, 1), load_machine("mill").model_copy(update={"dt": H})
+    times = []
+    for most in (numbers.CHORDS, 0.0):
+        monkeypatch.setattr(numbers, "CHORDS", most)
+        trace = Trace()
+        plan = OptimalMethod().plan(program, machine, log=trace)
+        assert plan.verdict.passed
+        slower = any(step.name == "slower in places" for step in trace.steps)
+        assert slower == (most == 0.0)
+        times.append(plan.cycle_time)
+    assert times[0] < 0.9 * times[1]

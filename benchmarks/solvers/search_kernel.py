@@ -133,7 +133,10 @@ def main() -> None:
             str(row["axes"]),
             f"{row['windows']:,}",
             f"{row['steps']:,}",
-            *("-" if math.isnan(us := row[f"us_{kind}"]) else f"{us:.2f}" for kind in ("single", "lanes", "alone")),
+            *(
+                "-" if math.isnan(us := row[f"us_{kind}"]) else f"{us:.2f}"
+                for kind in ("single", "lanes", "alone")
+            ),
         ]
         for row in rows
     ]

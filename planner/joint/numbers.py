@@ -38,8 +38,11 @@ def jerk_weights(run: TubeRun, leg: Array, velocity: FloatArray, least: float) -
 
 
 def narrowed(run: TubeRun, room: FloatArray) -> FloatArray:
-    """Distances `room` [mm], narrowed by `ROUNDING` and for chords."""
-    by_jerk = run.chord and float(np.linalg.norm(run.jerk)) * run.chord**3 / 6.0
+    """Distances `room` (n,) [mm], narrowed by `ROUNDING` and for chords."""
+    jerk = (
+        np.linalg.norm(run.jerk) if np.isfinite(run.jerk).all() else 0.0
+    )  # without limits nothing is known of it
+    by_jerk = float(jerk) * run.chord**3 / 6.0
     return room * (1.0 - ROUNDING) - np.minimum(by_jerk, CHORDS * room)
 
 

@@ -109,7 +109,8 @@ def planned_on_cluster(
     """
     distributed = import_needed("distributed", "--cluster")
     # how it tries to reach a scheduler that has gone, in pages; what came of it is said below
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    for name in ("client", "batched"):
+        logging.getLogger(f"distributed.{name}").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=WAIT, set_as_default=False)
     except (OSError, ValueError) as fault:

@@ -61,7 +61,7 @@ class Search:
         return dataclasses.replace(self, finer=(), gap=LARGE_GAP, again=False)
 
 
-# Steps that are searched with the usual effort at most, a minute or two on two processors; of a small motion.
+# Steps that are searched with the usual effort at most; of a small motion.
 STEPS_MAX, SMALL = SIZES.searched_most, SIZES.searched_finely
 THOROUGH = Search(steps_max=float("inf"), finer=((SECOND_CUT, SECOND_GAP), (BEST_CUT, BEST_GAP)))
 

@@ -89,7 +89,7 @@ class Sizes:
     corners_finely: int = _size(EFFORT, 50_000, 2)
     searched_again: int = _size(EFFORT, 10_000, 5)  # steps: up to 1e-3 (planning/attempts.py)
     searched_finely: int = _size(EFFORT, 30_000, 20)  # steps: 7e-5 on reliefs (planning/optimal/effort.py)
-    searched_most: int = _size(EFFORT, 5_000_000, 200)  # steps: some 12 GB; 9 % on a million blocks of relief
+    searched_most: int = _size(EFFORT, 5_000_000, 200)  # steps: `python -m benchmarks.cost.growth`
     # blocks of a job beside whose motion on a path method kinematic is planned
     rivals_planned: int = _size(EFFORT, 40_000, 100)
     corners_compared: int = _size(EFFORT, 1_000_000, 2_000)  # points: some 10 s and 1 GB

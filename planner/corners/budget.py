@@ -25,8 +25,9 @@ from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 
-# Of the tolerance: what filters take at most for the joint search to be enough [-]. On 32 random jobs the motion on the path
-# was never faster where they took less than 1.5 of it, and by up to 12 % where they took more than 2.
+# Of the tolerance: what filters take at most for the joint search to be enough [-]. Longer ones, which move the motion by more
+# than the search lets a node be from its leg, may leave the motion on the path faster
+# (`python -m benchmarks.net.ablation ROWS --net NET --without "share of tolerance"`).
 SEARCHED = 1.0
 NORMAL = "normal_acceleration"  # key of the machine file, and name of the limit
 

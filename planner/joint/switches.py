@@ -206,11 +206,9 @@ def _fast_steps(state, jerk, h, begin, end, feed):
         for x in (0.0, 0.5, 1.0):  # Bezier ordinates of the velocity there
             square = 0.0
             for k in range(axes):
-                v, a = (
-                    state[n, 1, k] + t * (state[n, 2, k] + t * jerk[n, k] / 2.0),
-                    state[n, 2, k] + t * jerk[n, k],
-                )
-                square += (v + span * x * (a + (span * jerk[n, k] / 2.0 if x == 1.0 else 0.0))) ** 2
+                a, j = state[n, 2, k], jerk[n, k]
+                v, a = state[n, 1, k] + t * (a + t * j / 2.0), a + t * j
+                square += (v + span * x * (a + (span * j / 2.0 if x == 1.0 else 0.0))) ** 2
             most = max(most, square)
         found[n] = np.sqrt(most) > feed * (1.0 + SAME)
     return found
@@ -259,17 +257,13 @@ def _too_fast(
 
 
 def switches_missed(
-    run: TubeRun,
-    leg: Array,
-    h: FloatArray,
-    state: FloatArray,
-    jerk: FloatArray,
-    part: slice = slice(None),
+    run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, jerk: FloatArray, part: slice = slice(None)
 ) -> Beside | None:
     """Where N steps run at the larger of two feeds while they are still to be nearer to the vertex between them, in the
     steps `part`, the nodes inside it that get a row for it: that of the vertex; those of the faster leg that are nearer, and
     those within the budget of the vertex on which the way to it is the wrong one; and the node before a step that comes
-    nearer between nodes, which is to be further from the vertex by as much. None where there are none.
+    nearer between nodes, which is to be further from the vertex by as much. Where vertices may be passed together and none is
+    missed so, the nodes of the steps that are too fast between the places of a slow block. None where there are none.
 
     leg (N,), h (N,) [s], state (N+1, 3, A) [mm, s], jerk (N, A)
     """

@@ -23,6 +23,7 @@ from planner.nc.block_table import BlockTable
 from planner.nc.cutter import CutterFault
 from planner.nc.faults import FaultList, Findings, IgnoredWords, Notes
 from planner.nc.integers import DwellWords, integers_of
+from planner.nc.language.detect import Archived
 from planner.nc.lexer import Words
 from planner.nc.mover import COVET_AXES, Mover, go_home, go_to_switches
 from planner.nc.moves import Block, WordFault
@@ -83,7 +84,7 @@ class Interpreter:
         self.limits = LimitsInForce()
         self.saved = SavedStates()
         self.ended = False  # M2, M30 or a second % was executed; later chunks are not
-        self.archive: dict[str, bytes] = {}  # further programs of the file, by the names of their own
+        self.archive: dict[str, Archived] = {}  # further programs of the file, by the names of their own
         self.two_axes = False  # the program has X and Z and no Y, and was not found to be one for a lathe
         self.by_word = 0  # rows that were executed word by word, not by the compiled loop
         self._timed = False  # a feed is in inverse time

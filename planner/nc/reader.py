@@ -140,7 +140,7 @@ def execute(
     for first, last in reading.lines:
         interpreter.findings.assume(f"lines {first} to {last} are left out, as --ignore says", first)
     interpreter.archive = detect.programs_of(data)
-    mains = (text for name, text in interpreter.archive.items() if name.endswith("mpf"))
+    mains = (one.text() for name, one in interpreter.archive.items() if name.endswith("mpf"))
     data = next(mains, data)
     called = rewritten(data, machine, reading, source)
     if called is not None and called.dialect == CL:

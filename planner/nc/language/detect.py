@@ -8,6 +8,7 @@ words has a code or a coordinate.
 """
 
 import re
+from typing import NamedTuple
 
 import numpy as np
 
@@ -117,15 +118,27 @@ _LANGUAGE = re.compile(rb"[#\[<=]")
 _DOES = np.frombuffer(b"GMXYZ", dtype=np.uint8)
 
 
-def programs_of(data: bytes) -> dict[str, bytes]:
-    """The programs of a Sinumerik's archive by the names of their files, in small letters, with blanks for all
-    others; {} for a file of one program."""
+class Archived(NamedTuple):
+    """A program of an archive."""
+
+    lines: int  # before it in the file
+    body: bytes  # behind its name, with blanks for that
+
+    def text(self) -> bytes:
+        """The program with blank lines for all that stands before it, so that lines and columns are those of the file."""
+        return b"\n" * self.lines + self.body
+
+
+def programs_of(data: bytes) -> dict[str, Archived]:
+    """The programs of a Sinumerik's archive by the names of their files, in small letters; {} for a file of one program."""
     heads = list(_PROGRAM_HEAD.finditer(data)) if data.count(b"%_N_") > 1 else []
-    found: dict[str, bytes] = {}
-    for head, behind in zip(heads, [*heads[1:], None], strict=True) if heads else ():
-        begin, end = head.end(), len(data) if behind is None else behind.start()
-        blank = (re.sub(rb"[^\r\n]", b" ", part) for part in (data[:begin], data[end:]))
-        found[f"{head[1].decode()}.{head[2].decode()}".lower()] = data[begin:end].join(blank)
+    ends = [*(head.start() for head in heads[1:]), len(data)]
+    found, lines, before = dict[str, Archived](), 0, 0
+    for head, end in zip(heads, ends, strict=True) if heads else ():
+        lines += data.count(b"\n", before, head.start())
+        before = head.start()
+        name = f"{head[1].decode()}.{head[2].decode()}".lower()
+        found[name] = Archived(lines, b" " * len(head[0]) + data[head.end() : end])
     return found
 
 

@@ -111,7 +111,7 @@ class _Files:
         """Read a subprogram in the program's folder or below; False for none. Raises ProgramFault."""
         program, wanted = Path(self.run.interpreter.source), self.dialect.files(name)
         path, archive = None, self.run.interpreter.archive
-        data = next((archive[file] for file in archive if file in wanted), None)
+        data = next((archive[file].text() for file in wanted if file in archive), None)
         if data is None and program.is_file() and _CALLED.fullmatch(name):
             found = (one for one in _below(program.parent) if one.name.lower() in wanted and one.is_file())
             path = next((one for one in found if one.stat().st_size <= FILE_MAX), None)

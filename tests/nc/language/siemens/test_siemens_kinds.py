@@ -10,6 +10,7 @@ import pytest
 
 from planner.base.errors import InputError
 from planner.machine.files import machine_from_dict
+from planner.nc.language.detect import programs_of
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program, read_program
 
@@ -208,3 +209,15 @@ def test_a_lathe_that_the_machine_file_names_has_its_own_language() -> None:
     np.testing.assert_allclose(program.end, [[25, 0, 2], [25, 0, -20], [30, 0, -25]], atol=1e-9)
     assert program.expansion is not None
     assert program.expansion.dialect == "siemens"
+
+
+def test_programs_of_an_archive_keep_their_lines_and_share_its_bytes() -> None:
+    data = b"".join(b"%%_N_P%d_SPF\r\nG1 X%d F100\r\nM17\r\n" % (k, k) for k in range(300))
+    found = programs_of(data)
+    assert len(found) == 300
+    assert sum(len(one.body) for one in found.values()) <= len(data)  # it was the square of it
+    lines = data.splitlines()
+    for k, one in enumerate(found.values()):
+        own = one.text().splitlines()
+        assert own[3 * k + 1 : 3 * k + 3] == lines[3 * k + 1 : 3 * k + 3]
+        assert not b"".join(own[: 3 * k + 1]).strip()

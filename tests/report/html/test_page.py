@@ -348,32 +348,3 @@ def test_the_path_fills_its_box_and_is_not_cut_off(browser: Any) -> None:
     across, up = (max(abs(point[k]) for point in seen) for k in (0, 1))
     assert max(across, up) <= 0.9
     assert max(across, up) >= 0.6
-
-
-@pytest.mark.slow
-def test_on_paper_the_path_is_the_first_picture(browser: Any) -> None:
-    """A picture in WebGL leaves paper empty; the others are as wide as the paper, in the colours of a light ground."""
-    assert (
-        browser.execute_script("return getComputedStyle(document.getElementById('first')).display") == "none"
-    )
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
-    shown = "const s = (id) => getComputedStyle(document.getElementById(id)).display; return ['path', 'first', 'scale', 'lines-box'].map(s)"
-    assert browser.execute_script(shown) == ["none", "flex", "flex", "none"]
-    wide = "return [...document.querySelectorAll('#profile .main-svg')].map((svg) => svg.getBoundingClientRect().width)"
-    assert max(browser.execute_script(wide)) <= browser.execute_script("return document.body.clientWidth")
-    assert browser.execute_script(
-        "return document.querySelector('#profile .main-svg').getAttribute('viewBox')"
-    )
-    inks = "return [...document.querySelectorAll('#profile svg text')].map((one) => one.style.fill)"
-    dark = {"name": "prefers-color-scheme", "value": "dark"}
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "screen", "features": [dark]})
-    browser.refresh()
-    wait_for(browser, "return document.body.dataset.ready")
-    on_screen = browser.execute_script(inks)
-    assert "rgb(230, 233, 239)" in on_screen
-    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
-    assert set(browser.execute_script(inks)) <= {"rgb(29, 36, 48)", "rgb(102, 112, 133)"}
-    browser.execute_script("dispatchEvent(new Event('afterprint'))")
-    assert browser.execute_script(inks) == on_screen
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})

@@ -4,7 +4,8 @@ times of programs that it has not seen.
     python -m benchmarks.controls.fit_linuxcnc --peers FOLDER
 
 FOLDER is a copy of ../shared/peers with the compiled `tp_harness`; its planner is set to 100 mm/s, and to 700, 2000 and 5000 mm/s2,
-while the machine file says 2000 mm/s2. Times carry noise of 0.1 %.
+while the machine file says 2000 mm/s2. Times carry noise of 0.1 %. Beside them limits from recorded motions of x.nc, y.nc and
+z.nc, with two long rapids at their end: positions at 1 ms with noise of 1 um.
 """
 
 from __future__ import annotations
@@ -22,10 +23,13 @@ from benchmarks.controls.control_times import SHARED
 from benchmarks.record import markdown, write_results
 from planner.controls.timing.fit import fitted, programs_to_time
 from planner.controls.timing.times import control_times
+from planner.controls.timing.traces import Trace, limits_of
 from planner.machine import load_machine
 
 UNSEEN = ("a_pentagon", "b_zigzag", "d_starspiral", "e_chips")
 NOISE = 0.001  # of a time
+NOISE_OF_PLACE = 0.001  # [mm]
+RAPIDS = "G0 X60 Y60 Z60\nG0 X0 Y0 Z0\nM2"  # long enough for the highest speed
 
 
 def taken(peers: Path, file: Path, accel: float) -> float:
@@ -33,6 +37,17 @@ def taken(peers: Path, file: Path, accel: float) -> float:
     command = ["/usr/bin/python3", str(peers / "lcnc_fast.py"), str(file), "--tol", "0.05", "--q", "0"]
     done = subprocess.run([*command, "--amax", str(accel)], capture_output=True, text=True, check=True)
     return float(json.loads(done.stdout)["cycle_time"])
+
+
+def recorded(peers: Path, file: Path, accel: float, rng: np.random.Generator) -> Trace:
+    """The motion of a program on LinuxCNC, with noise."""
+    slower, out = file.with_suffix(".ngc"), file.with_suffix(".npz")
+    slower.write_text(file.read_text().replace("M2", RAPIDS))
+    command = ["/usr/bin/python3", str(peers / "lcnc_fast.py"), str(slower), "--tol", "0.05", "--q", "0"]
+    subprocess.run([*command, "--amax", str(accel), "--out", str(out)], capture_output=True, check=True)
+    with np.load(out) as motion:
+        place = motion["xyz"] + rng.normal(0.0, NOISE_OF_PLACE, motion["xyz"].shape)
+        return Trace(t=motion["t"], position=dict(zip("xyz", place.T, strict=True)), source=str(file))
 
 
 def main() -> None:
@@ -49,12 +64,18 @@ def main() -> None:
                 file.write_text(text)
                 seconds = taken(options.peers, file, accel) * rng.normal(1.0, NOISE)
                 measured[name] = (planner.read_program(text=text), seconds)
+            files = [Path(folder) / f"{letter}.nc" for letter in "xyz"]
+            traces = [recorded(options.peers, file, accel, rng) for file in files]
         found = fitted(measured, machine, "linuxcnc")
         for name, _, value in found.settings:
             wanted = 1.0 if name == "factor" else accel
             rows.append(
                 [f"{accel:g}", name, f"{wanted:g}", f"{value:.5g}", f"{100 * (value / wanted - 1):+.2f}"]
             )
+        for name, before, value in limits_of(traces, machine)[1]:
+            wanted = accel if name.endswith("acceleration") else before
+            off = f"{100 * (value / wanted - 1):+.2f}"
+            rows.append([f"{accel:g}", f"{name}, recorded", f"{wanted:g}", f"{value:.5g}", off])
         for job in UNSEEN:
             file = SHARED / "peers" / "programs" / f"{job}.ngc"
             own, program = taken(options.peers, file, accel), planner.read_program(file, machine)

@@ -19,6 +19,7 @@ from planner.commands.options import (
 from planner.commands.terminal import guarded, say, show
 
 if TYPE_CHECKING:
+    from planner.controls.timing.traces import Trace
     from planner.machine import Machine
 
 
@@ -128,10 +129,11 @@ def _limits_given(texts: list[str]) -> dict[str, float]:
 
 @guarded
 def fit_command(
-    times: Annotated[
+    measured: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="PROGRAM=SECONDS", help="a program and how long the control took for it [s]; all five"
+            metavar="PROGRAM=SECONDS|TRACE",
+            help="a program and how long the control took for it [s], or its trace; or a trace alone (CSV, halscope, Klipper)",
         ),
     ] = None,
     machine: MachineOption = None,
@@ -142,17 +144,21 @@ def fit_command(
     ] = None,
     output: Annotated[Path | None, output_option("FILE", "machine file to write (.toml)")] = None,
 ) -> None:
-    """Find accelerations, the speed at corners and a factor from the times of five test programs, which --write makes."""
+    """Find limits of axes from recorded traces; accelerations, the speed at corners and a factor from the times of five
+    test programs, which --write makes."""
     from planner.controls.timing.fit import fitted, machine_text, programs_to_time
     from planner.controls.timing.times import control_named, control_times
+    from planner.controls.timing.traces import limits_of
     from planner.nc.reader import read_program
     from planner.report.replace import write_new
 
-    if (write is None) == (not times):
-        raise InputError("give --write DIR to get the test programs, or PROGRAM=SECONDS of each of them")
+    if (write is None) == (not measured):
+        raise InputError(
+            "give --write DIR to get the test programs, or PROGRAM=SECONDS of each of them, or TRACE"
+        )
     limits = machine_named(machine)
-    name = control_named(control, limits)
     if write is not None:
+        name = control_named(control, limits)
         try:
             write.mkdir(parents=True)
         except OSError as fault:
@@ -162,24 +168,42 @@ def fit_command(
             took = control_times(read_program(text=text), limits, name).seconds
             say(f"{write / file}: about {took:.0f} s, from X0 Y0 Z0; measure how long it takes")
         return
-    found = fitted(
-        {file: (read_program(file, limits), took) for file, took in map(_time, times or [])}, limits, name
-    )
-    for what, before, value in found.settings:
+    given = [_measured(text) for text in measured or []]
+    traces, times = [one[2] for one in given if one[2]], {file: took for file, took, _ in given if file}
+    settings: tuple[tuple[str, float, float], ...] = ()
+    said: list[str] = []
+    if traces:
+        limits, settings, said = limits_of(traces, limits)
+    if times:
+        name = control_named(control, limits)
+        of_times = fitted(
+            {file: (read_program(file, limits), took) for file, took in times.items()}, limits, name
+        )
+        limits, settings = of_times.machine, (*settings, *of_times.settings)
+        said += of_times.residual_texts()
+    for what, before, value in settings:
         say(f"{what}: {value:.6g}, before {before:.6g}")
-    for text in found.residual_texts():
+    for text in said:
         say(text)
     if output is not None:
-        write_new(output, machine_text(found, name).encode())
+        write_new(output, machine_text(limits, settings, said).encode())
         say(f"{output} written")
 
 
-def _time(text: str) -> tuple[str, float]:
-    file, _, number = text.rpartition("=")
+def _measured(text: str) -> "tuple[str, float, Trace | None]":
+    """The program, "" for none, its seconds, and the trace that they are from."""
+    from planner.controls.timing.traces import read_trace
+
+    file, _, took = text.rpartition("=")
     try:
-        seconds = float(number)
+        seconds = float(took)
     except ValueError:
-        seconds = 0.0
+        if not os.path.isfile(took):
+            raise InputError(
+                f"'{text}': write a program and its seconds or its trace, as in x.nc=61.2 or x.nc=x.csv, or a trace"
+            ) from None
+        trace = read_trace(took)
+        return file, trace.seconds, trace
     if not file or not 0.0 < seconds < float("inf"):
         raise InputError(f"'{text}': write a program and its seconds above 0, as in x.nc=61.2")
-    return file, seconds
+    return file, seconds, None

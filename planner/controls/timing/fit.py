@@ -11,7 +11,7 @@ file says. Velocities stay as they are there.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -176,13 +176,11 @@ def _with(machine: Machine, control: str, values: Mapping[str, float]) -> Machin
     return machine_from_dict(data)
 
 
-def machine_text(found: Found, control: str) -> str:
-    """The machine file of what was found, with where each setting comes from."""
-    lines = [
-        f"# Measured on {control}: {name} {now:.6g}, before {was:.6g}." for name, was, now in found.settings
-    ]
-    lines += [f"# {text}." for text in found.residual_texts()]
-    return "\n".join([*lines, *_toml(found.machine.model_dump(exclude_defaults=True))]) + "\n"
+def machine_text(machine: Machine, settings: Sequence[tuple[str, float, float]], said: Sequence[str]) -> str:
+    """The machine file of what was found: settings (name, before, now), and what there is to say of them."""
+    lines = [f"# Measured: {name} {now:.6g}, before {was:.6g}." for name, was, now in settings]
+    lines += [f"# {text}." for text in said]
+    return "\n".join([*lines, *_toml(machine.model_dump(exclude_defaults=True))]) + "\n"
 
 
 def _toml(data: Mapping[str, object], name: str = "") -> list[str]:

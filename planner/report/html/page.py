@@ -23,8 +23,8 @@ from planner.machine import LINEAR_AXES
 from planner.nc.program import Kind
 from planner.report.figure import (
     AGAINST,
-    CIVIDIS,
     LIGHT,
+    LOW_TO_HIGH,
     TOOL,
     MotionColumns,
     highest_feed,
@@ -69,6 +69,8 @@ def report_page(
     columns, about = _columns(plan, units_of(plan.program, units))
     columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
     about["summary"] = told = {"told": plan_rows(plan)} | (said or summary(plan))
+    names = list(dict.fromkeys([*about["limits"], *(told.get("held_by") or ())]))
+    about["colours"] = dict(zip(names, limit_colours(names), strict=True))
     return page_of("report", "planned", told["program"], about, columns, PICTURE=path_picture(plan, PICTURE))
 
 
@@ -107,7 +109,6 @@ def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]
     about = {
         "linear": [axis for axis in shown.axes if axis in LINEAR_AXES],
         "limits": list(samples.limits),
-        "colours": limit_colours(samples.limits),
         "colourings": colourings(samples, units),
         "units": dataclasses.asdict(units) | {"per_feed": units.per_feed},
         "axes": ", ".join(titles[axis] for axis in shown.axes if axis in LINEAR_AXES),
@@ -182,10 +183,10 @@ def path_picture(plan: Plan, size: float) -> str:
     columns = MotionColumns(plan, shown)
     feed = columns["feed"]
     programmed = columns["programmed"]
-    highest, rapid = highest_feed(feed, programmed), len(CIVIDIS)
-    colour = np.minimum(feed / max(highest, 1e-9) * len(CIVIDIS), len(CIVIDIS) - 1).astype(np.int64)
+    shades = [*LOW_TO_HIGH["light"], LIGHT]
+    highest, rapid = highest_feed(feed, programmed), len(shades) - 1
+    colour = np.minimum(feed / max(highest, 1e-9) * rapid, rapid - 1).astype(np.int64)
     colour[plan.program.kind[np.clip(shown.block, 0, None)] == Kind.RAPID] = rapid
-    shades = [*CIVIDIS, LIGHT]
     lines = "".join(
         f'<polyline points="{_points(pair)}" stroke="{TOOL}" stroke-width="0.5"/>' for pair in ends
     )
@@ -196,7 +197,7 @@ def path_picture(plan: Plan, size: float) -> str:
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
         f'height="{height:.0f}" role="img" '
-        f'aria-label="path coloured by feed" fill="none" stroke-width="1.6" stroke-linecap="round">{lines}</svg>'
+        f'aria-label="path coloured by feed" fill="none" stroke-width="2.4" stroke-linecap="round">{lines}</svg>'
     )
 
 

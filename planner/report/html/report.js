@@ -114,7 +114,11 @@
     return { x: [[x]], y: [[y]], z: [[z]] };
   };
   const pathPlot = element("path"), profilePlot = element("profile");
-  element("first").remove();
+  element("first").className = "printed";
+  pathPlot.hidden = false;
+  const { colorscale, cmax } = colourings.feed.light, stripe = make("i"), shown = colorscale.filter(([at]) => at > colorscale[1][0] || at === 1);
+  stripe.style.background = `linear-gradient(90deg, ${shown.map(([, colour]) => colour).join()})`;
+  element("scale").append("feed 0", stripe, `${digits(cmax)} ${feedUnit}; rapids grey`);
   const view = pathLayout(about.view, pathPlot), fitted = view.scene.aspectratio.x;
   await Plotly.newPlot(pathPlot, [
     { ...about.programmed, ...programmed },
@@ -284,10 +288,9 @@
   // Shares of the time
   {
     const held = Object.entries(summary.held_by || {}).filter(([, share]) => Math.floor(100 * share + 0.5) > 0).reverse();
-    const colour = (name) => about.colours[about.limits.indexOf(name)] || "#606060";
     if (held.length) {
       await Plotly.newPlot("share", [{ type: "bar", orientation: "h", y: held.map(([name]) => escaped(word[name] || name)), x: held.map(([, share]) => 100 * share),
-        marker: { color: held.map(([name]) => colour(name)) }, text: held.map(([, share]) => `${Math.floor(100 * share + 0.5)} %`),
+        marker: { color: held.map(([name]) => about.colours[name]) }, text: held.map(([, share]) => `${Math.floor(100 * share + 0.5)} %`),
         textposition: "outside", cliponaxis: false, textangle: 0, hovertemplate: "%{y}: %{text} of the time<extra></extra>" }],
       { ...look, margin: { l: 110, r: 44, t: 6, b: 40 }, xaxis: { title: { text: "share of the cycle time, each in full [%]" } }, yaxis: { automargin: true } }, { ...bare, displayModeBar: false });
     } else {

@@ -10,6 +10,22 @@ const look = {
   template: { layout: { xaxis: grid, yaxis: grid, scene: { xaxis: inSpace, yaxis: inSpace, zaxis: inSpace } } },
 };
 
+// On paper pictures are as wide as it is, in the colours of a light ground.
+const INKS = { [ink]: "#1d2430", [dim]: "#667085", [rule]: "#d9dee7" };
+const PAPER = [[".plot svg *", INKS], ["#profile svg *", Object.fromEntries(Object.entries(ON_DARK).slice(0, 3).map(([light, onDark]) => [onDark, light]))]];
+const written = (colour) => Object.assign(make("i").style, { color: colour }).color;
+function recolour(back) {
+  for (const [where, colours] of dark ? PAPER : []) {
+    const to = Object.fromEntries(Object.entries(colours).map(([screen, paper]) => (back ? [written(paper), screen] : [written(screen), paper])));
+    for (const { style } of document.querySelectorAll(where)) for (const name of ["fill", "stroke"]) if (to[style[name]]) style[name] = to[style[name]];
+  }
+}
+addEventListener("beforeprint", () => {
+  for (const svg of document.querySelectorAll(".plot .main-svg")) svg.setAttribute("viewBox", `0 0 ${svg.getAttribute("width")} ${svg.getAttribute("height")}`);
+  recolour(false);
+});
+addEventListener("afterprint", () => recolour(true));
+
 // A path in 3-D as large as its box allows; wide, high: what it measures on the screen, in units of the scene
 function pathLayout([scene, wide, high], box) {
   const room = Math.max(box.clientWidth - COLOURBAR, 100), height = Math.max(box.clientHeight, 100);

@@ -59,7 +59,7 @@ def test_known_settings_come_back(control: str, scale: float, seed: int, tmp_pat
     known, predicted = (control_times(unseen, one, control).seconds for one in (true, found.machine))
     assert predicted == pytest.approx(known, rel=0.01)
     file = tmp_path / "found.toml"
-    file.write_text(machine_text(found, control))
+    file.write_text(machine_text(found.machine, found.settings, found.residual_texts()))
     assert planner.load_machine(file) == found.machine
 
 

@@ -5,14 +5,15 @@ moves in one program and of points on a curve (programs.py), and those that are 
 offsets, feed modes, lathe, cutter compensation, splines, and all of these in subprograms, loops and branches (tests/nc/random_nc.py,
 random_splines.py, random_together.py).
 
+From seed 200,000 on programs are as other people's are (others.py).
+
 Most jobs are small, so that many can be made: a few blocks and some hundred samples; one in `LARGE` has up to `BLOCKS` and `SAMPLES`. A
 job whose motion would have more samples than it may gets a larger period, and then faster limits and feeds, which make the same motion
-in less time; dwells are cut.
+in less time; dwells are cut (shortened.py).
 """
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import importlib
 import itertools
@@ -25,7 +26,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.campaign import axes as axes_campaign
+from benchmarks.campaign import others
 from benchmarks.campaign.programs import BLOCKS, dense, mixed
+from benchmarks.campaign.shortened import shortened
 from benchmarks.jobs import random_lines
 from planner.base.errors import InputError
 from planner.machine import ROTARY_AXES, Axis, Fir, Machine, Mode
@@ -42,10 +45,8 @@ SMALL_SAMPLES, SMALL_BLOCKS, LARGE = (
 # Of jobs with more axes or blocks than these only a share is planned in the ways that take tens of seconds for them.
 AXES_OF_SLOW, BLOCKS_OF_SLOW, SHARE_OF_SLOW = 4, 8, 0.1
 SHARE_OF_NARROW = 0.8  # of the programs that move no rotary axis, on machines that have none [-]
-PERIOD_MAX = 0.008  # [s]
-DWELL_MAX = 0.05  # [s]
+PERIOD_MAX = 0.008  # to which a period may be lengthened [s]
 DRAWS = 60  # of a program until one has few blocks and moves; the least one counts where none has
-VELOCITY_MAX, ACCELERATION_MAX, JERK_MAX = 4e3, 1e5, 3e7  # of a job that is made quicker [mm/s, mm/s2, mm/s3]
 STREAM = 41  # of random numbers
 FIRST_SEEDS = 20  # by whose jobs the draws are known again
 DIGITS = 6  # of their numbers
@@ -75,6 +76,7 @@ DEFAULT: dict[str, Any] = {}
 # From this seed on two jobs of four are planned as `planner plan` does without options, however long that takes; the draws of the
 # seeds before stay as they were, because tests name jobs by them.
 HALF_DEFAULT_FROM = 100_000
+OTHERS_FROM = 200_000
 SLOW = (("optimal", {}), ("optimal", QUICK | {"shaped": True}), ("tube", {}))
 SOURCES = {
     "lines and arcs": 18,
@@ -147,7 +149,7 @@ def job_from(data: dict[str, Any]) -> Job:
     """The job of `Job.data`."""
     drawn, text = Machine.model_validate(data["machine"]), "\n".join(data["text"])
     program, machine = _short(
-        parse_program(text, drawn, source=f"{data['source']} job"), drawn, data["samples"]
+        parse_program(text, drawn, source=f"{data['source']} job"), drawn, data["samples"], data["seed"]
     )
     return Job(**data | {"text": text, "program": program, "refusal": "", "machine": machine, "drawn": drawn})
 
@@ -164,14 +166,18 @@ def job(seed: int) -> Job:
 
 def _job(seed: int, rng: Rng) -> Job:
     names, weights = list(SOURCES), np.array([*SOURCES.values()], dtype=float)
-    source = names[rng.choice(len(names), p=weights / weights.sum())]
+    source = names[rng.choice(len(names), p=weights / weights.sum())] if seed < OTHERS_FROM else ""
     shares = np.array([share for share, _, _ in METHODS])
     _, method, settings = METHODS[rng.choice(len(METHODS), p=shares / shares.sum())]
     large = bool(rng.random() < 1.0 / LARGE)
     most = int(min(2 + rng.exponential(BLOCKS / 3 if large else SMALL_BLOCKS), BLOCKS))  # of most draws
-    samples = SAMPLES if large else int(rng.integers(*SMALL_SAMPLES))
-    text, machine, program, refusal = _drawn(source, rng)
-    for _ in range(DRAWS - 1):
+    samples = SAMPLES if large or seed >= OTHERS_FROM else int(rng.integers(*SMALL_SAMPLES))
+    if seed < OTHERS_FROM:
+        text, machine, program, refusal = _drawn(source, rng)
+    else:
+        source, text, machine = others.drawn(rng)
+        program, refusal = _read(source, text, machine)
+    for _ in range(DRAWS - 1 if seed < OTHERS_FROM else 0):
         if program is None or 0 < len(program) <= most:
             break
         other = _drawn(source, rng)
@@ -194,7 +200,7 @@ def _job(seed: int, rng: Rng) -> Job:
         program, refusal = None, f"{len(program)} blocks are too many for this campaign"
     drawn = machine
     if program is not None:
-        program, machine = _short(program, machine, samples)
+        program, machine = _short(program, machine, samples, seed)
     return Job(
         seed=seed, source=source, text=text, program=program, refusal=refusal, machine=machine, drawn=drawn,
         samples=samples, method=method, settings=dict(settings), tolerance=tolerance,
@@ -218,10 +224,15 @@ def _drawn(source: str, rng: Rng) -> tuple[str, Machine, Program | None, str]:
                 return text, linear, parse_program(text, linear, source=f"{source} job"), ""
             except InputError:  # it may be that the program moves a rotary axis
                 pass
+    return text, machine, *_read(source, text, machine)
+
+
+def _read(source: str, text: str, machine: Machine) -> tuple[Program | None, str]:
+    """Program, or refusal."""
     try:
-        return text, machine, parse_program(text, machine, source=f"{source} job"), ""
+        return parse_program(text, machine, source=f"{source} job"), ""
     except InputError as fault:
-        return text, machine, None, str(fault)
+        return None, str(fault)
 
 
 def _linear(machine: Machine) -> Machine:
@@ -284,62 +295,6 @@ def machine_of(rng: Rng, letters: str) -> Machine:
     )  # fmt: skip
 
 
-def _short(program: Program, machine: Machine, samples: int) -> tuple[Program, Machine]:
-    """The job with a larger period, faster limits and shorter dwells, if its motion would have more samples than that."""
-    program = dataclasses.replace(program, dwell=np.minimum(program.dwell, DWELL_MAX))
-    time = duration(program, machine)
-    dt = float(np.clip(time / samples, machine.dt, PERIOD_MAX))
-    machine = machine.model_copy(update={"dt": dt})
-    faster = time / (samples * dt)
-    for _ in range(2):  # the second time for what the limits do not allow
-        if faster > 1.0:
-            program, machine = quicker(program, machine, faster)
-            faster = duration(program, machine) / (samples * dt)
-    return program, machine
-
-
-def quicker(program: Program, machine: Machine, by: float) -> tuple[Program, Machine]:
-    """The same motion in a time that is shorter by a factor: feeds, velocities, accelerations and jerks by its powers, as
-    far as a machine goes."""
-    axes = {
-        letter: Axis(
-            velocity=max(min(a.velocity * by, VELOCITY_MAX), a.velocity),
-            acceleration=max(min(a.acceleration * by**2, ACCELERATION_MAX), a.acceleration),
-            jerk=max(min(a.jerk * by**3, JERK_MAX), a.jerk),
-            wrapped=a.wrapped,
-        )
-        for letter, a in machine.axes.items()
-    }
-    update: dict[str, Any] = {"axes": axes}
-    if machine.feed_max is not None:
-        update["feed_max"] = machine.feed_max * by
-    if machine.normal_acceleration is not None:
-        update["normal_acceleration"] = machine.normal_acceleration * by**2
-    return dataclasses.replace(program, feed=program.feed * by), machine.model_copy(update=update)
-
-
-def duration(program: Program, machine: Machine) -> float:
-    """How long the program takes from stop to stop, about [s]."""
-    position = np.vstack([program.start, program.end])
-    way = np.abs(np.diff(position, axis=0))
-    for k, block in enumerate(program.arc_block):
-        radius = np.linalg.norm((position[block] - program.arc_center[k])[:3])
-        way[block, :3] = np.maximum(way[block, :3], radius * abs(program.arc_sweep[k]))
-    for block, points in zip(program.splines.block, program.splines.points, strict=True):
-        way[block] += np.abs(np.diff(points, axis=0)).sum(axis=0)
-    rotary = np.array([letter in "abc" for letter in program.axes])
-    angular = np.where(rotary, 180.0 / np.pi, 1.0)
-    total = float(program.dwell.sum())
-    feed = np.where(np.isfinite(program.feed), program.feed, np.inf)
-    total += float((np.linalg.norm(way, axis=1) / feed).sum())
-    for k, letter in enumerate(program.axes):
-        if letter in machine.axes:
-            axis, run = machine.axes[letter], way[:, k] * angular[k]
-            total += float(
-                (
-                    run / axis.velocity + 2 * np.sqrt(run / axis.acceleration) + 3 * np.cbrt(run / axis.jerk)
-                ).sum()
-            )
-    if machine.feed_max is not None:
-        total += float(np.linalg.norm(way, axis=1).sum()) / machine.feed_max
-    return total
+def _short(program: Program, machine: Machine, samples: int, seed: int) -> tuple[Program, Machine]:
+    """The job within so many samples; other people's machines keep their period."""
+    return shortened(program, machine, samples, machine.dt if seed >= OTHERS_FROM else PERIOD_MAX)

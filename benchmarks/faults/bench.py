@@ -29,6 +29,7 @@ class Bench:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.out = folder, folder / "out"
+        self.turn = -1  # of the kinds that come one after the other
         for name, text in JOBS.items():
             (folder / f"{name}.ngc").write_text(text)
         began = time.monotonic()

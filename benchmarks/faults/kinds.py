@@ -15,6 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from benchmarks.faults import hostile
 from benchmarks.faults.bench import ENDS, HIDDEN, INTERRUPTED, JOBS, PATIENCE, Bench, after, ended, not_whole
 
 
@@ -288,4 +289,9 @@ KINDS: dict[str, Callable[[Bench, random.Random], dict[str, Any]]] = {
     "two-at-once": two_at_once,
     "changing-input": changing_input,
     "worker": worker,
+    "compiling": hostile.compiling,
+    "first-runs": hostile.first_runs,
+    "damaged-kernels": hostile.damaged,
+    "planted-kernels": hostile.planted,
+    "bomb": hostile.bomb,
 }

@@ -70,6 +70,11 @@ def test_tests_of_a_line(tmp_path: Path) -> None:
     (tmp_path / "t.py").write_text("# changed\n")
     assert tests(7) == ["t.py", "other.py::first", "other.py::second"]
     known.write(tmp_path / "build" / "known.json")
+    (tmp_path / "t.py").write_text("")
+    compiled = SOURCE.replace("def ", "@njit\ndef ")
+    (tmp_path / "a.py").write_text(compiled)
+    of_kernels = Covered({"a.py": lines}, seconds, digests | {"a.py": digest(tmp_path / "a.py")})
+    assert of_kernels.tests_of(tmp_path, "a.py", 10, ["t.py"]) == ["t.py::short"]  # all, for what is compiled
     assert Covered.read(tmp_path / "build" / "known.json") == known
 
 

@@ -70,3 +70,14 @@ def test_a_joint_is_passed_so_early_that_those_after_it_are_passed_within_their_
     assert (np.diff(times) >= 0.0).all()
     assert (np.linalg.norm(at - vertex, axis=1) <= 0.36).all()
     assert times[1] < times[2] < 2.5
+
+
+def test_a_joint_between_two_samples_is_passed_between_their_times() -> None:
+    """On a line the time is that of the chord at the place itself, not that of a sample."""
+    text = "G21 G90 F600 G64 P0.01\nG1 X0.3\nG1 X0.55\nG1 X1\nM2\n"
+    toolpath = toolpath_from_program(parse_program(text, MACHINE), MACHINE)
+    motion = motion_through(np.array([[0.0, 0.0], [1.0, 0.0]]))
+    places = np.array([0.0, 0.3, 0.55, 1.0])
+    expected = np.interp(places, motion.position[:, 0], motion.t)
+    assert np.abs(expected[1:3, None] - motion.t).min() > 1e-3  # [s]
+    np.testing.assert_allclose(passing_times(motion, toolpath), expected, atol=1e-9)

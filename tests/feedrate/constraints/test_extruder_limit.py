@@ -7,6 +7,7 @@ import pytest
 
 from planner.feedrate.constraints.extruder import TURNING, ExtruderLimit, with_extruder_limit
 from planner.machine import load_machine
+from planner.machine.user_limit import Place
 
 ROUTER = load_machine("router")
 AXES = ("x", "y", "z")
@@ -22,3 +23,13 @@ def test_it_joins_where_the_axes_can_reach_it(which: int, share: float, joins: b
     limits[which] = ratio * reach / share
     machine = with_extruder_limit(ROUTER, AXES, limits, np.array([0.01, ratio]), np.array([0, 1]))
     assert any(isinstance(limit, ExtruderLimit) for limit in machine.own) == joins
+
+
+def test_speed_acceleration_and_jerk_are_those_at_which_the_filament_is_at_its_own() -> None:
+    """A block that feeds 0.05 mm a millimetre may run twenty times as fast as the extruder, one that feeds none at any speed."""
+    limits, ratio = np.array([5.0, 300.0, 9e3]), np.array([0.05, 0.0, 0.2])
+    at = Place(AXES, np.zeros((3, 4)), np.zeros((4, 3)), np.array([0, 1, 2, 0]))
+    limit = ExtruderLimit(limits, ratio)
+    found = limit.velocity(at), limit.acceleration(at), limit.jerk(at)
+    for bound, of_extruder in zip(found, limits, strict=True):
+        np.testing.assert_allclose(bound, of_extruder * np.array([20.0, np.inf, 5.0, 20.0]))

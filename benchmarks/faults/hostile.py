@@ -1,0 +1,264 @@
+"""Kinds of faults at the kernels that are kept, and files that are made to do harm (benchmarks/faults/kinds.py has the others)."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import random
+import resource
+import shutil
+import signal
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.faults.bench import Bench, after, ended
+
+STOP = ("plan", "a.ngc", "-o", "out", "-q", "--method", "stop")
+COMPILING = 12.0  # in which it is ended: about as long as compiling what `STOP` needs takes [s]
+DIGEST = hashlib.sha256().digest_size
+STRANGER = 54321  # a user that is not there
+ADDRESSES = 6 << 30  # of memory for a bomb [bytes]
+SECONDS = 40  # of processor time for a bomb [s]
+GIBIBYTE = 1 << 30
+
+
+# ------------------------------------------------------------------------------------------ kernels
+
+
+def with_cache(cache: Path, **more: str) -> dict[str, str]:
+    """The environment in which kernels are kept there, and nowhere else."""
+    return os.environ | {"NUMBA_CACHE_DIR": str(cache)} | more
+
+
+def warm(bench: Bench) -> Path:
+    """A cache with all kernels of `STOP`, made once."""
+    cache = bench.folder / "warm"
+    if not cache.exists():
+        end, said = bench.run(*STOP, env=with_cache(cache))
+        assert end == 0, said
+    return cache
+
+
+def unsound(cache: Path) -> list[str]:
+    """Files of a cache that are no kernels, or not what was written."""
+    found = []
+    for path in sorted(cache.rglob("*")):
+        whole = path.read_bytes() if path.is_file() else None
+        if whole is not None and (
+            path.suffix != ".kernel" or hashlib.sha256(whole[DIGEST:]).digest() != whole[:DIGEST]
+        ):
+            found.append(f"in the cache: {path.name}")
+    return found
+
+
+def compiling(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """Ctrl-C or kill -9 while kernels are compiled: what is kept is whole, and the next run goes on from there."""
+    cache = bench.folder / "cold"
+    shutil.rmtree(cache, ignore_errors=True)
+    sent = rng.choice([signal.SIGINT, signal.SIGKILL])
+    process = bench.start(*STOP, env=with_cache(cache))
+    after(process, rng.uniform(0.0, COMPILING))
+    process.send_signal(sent)
+    end = ended(process)
+    wrong = (
+        [] if sent == signal.SIGKILL else unsound(cache)
+    )  # what is killed may leave a part under another name
+    again = bench.run(*STOP, env=with_cache(cache))
+    row = bench.row([end, again], (0, 130, -signal.SIGINT, -signal.SIGKILL), sent=sent.name)
+    wrong += [] if again[0] == 0 else [f"the next run ends with {again[0]}"]
+    return row | {"wrong": row["wrong"] + wrong}
+
+
+def first_runs(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """Two first runs at once, into one cache and one folder."""
+    cache = bench.folder / "cold"
+    shutil.rmtree(cache, ignore_errors=True)
+    first = bench.start(*STOP, env=with_cache(cache))
+    time.sleep(rng.uniform(0.0, 2.0) * bench.takes)
+    second = bench.start(*STOP, env=with_cache(cache))
+    row = bench.row([ended(first), ended(second)], (0,))
+    return row | {"wrong": row["wrong"] + unsound(cache)}
+
+
+def damaged(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """Kernels that a disk, a crash or a person has changed: they are compiled anew, and the motion is the same."""
+    cache = bench.folder / "damaged"
+    shutil.rmtree(cache, ignore_errors=True)
+    shutil.copytree(warm(bench), cache)
+    kernels = sorted(cache.rglob("*.kernel"))
+    how = rng.choice(["bit", "zeros", "cut", "empty", "another's", "longer"])
+    for path in rng.sample(kernels, rng.choice([1, 1, 3])):
+        _damage(path, how, kernels, rng)
+    before = (
+        (bench.folder / "warm.csv").read_bytes()
+        if (bench.folder / "warm.csv").exists()
+        else _setpoints(bench)
+    )
+    end = bench.run(*STOP, "--format", "csv", env=with_cache(cache))
+    now = (bench.out / "trajectory.csv").read_bytes() if end[0] == 0 else b""
+    row = bench.row([end], (0,), how=how)
+    return row | {"wrong": row["wrong"] + unsound(cache) + ([] if now == before else ["another motion"])}
+
+
+def _setpoints(bench: Bench) -> bytes:
+    """Those of the warm cache, kept beside."""
+    end, said = bench.run(*STOP, "--format", "csv", env=with_cache(warm(bench)))
+    assert end == 0, said
+    shutil.copy(bench.out / "trajectory.csv", bench.folder / "warm.csv")
+    return (bench.folder / "warm.csv").read_bytes()
+
+
+def _damage(path: Path, how: str, kernels: list[Path], rng: random.Random) -> None:
+    whole = bytearray(path.read_bytes())
+    at = rng.randrange(len(whole))
+    if how == "bit":
+        whole[at] ^= 1 << rng.randrange(8)
+    elif how == "zeros":
+        whole[at : at + 512] = bytes(len(whole[at : at + 512]))
+    elif how == "cut":
+        del whole[at:]
+    elif how == "empty":
+        whole.clear()
+    elif how == "longer":
+        whole += bytes(rng.randrange(1, 4096))
+    else:
+        whole = bytearray(rng.choice([other for other in kernels if other != path]).read_bytes())
+    path.write_bytes(whole)
+
+
+class _Planted:
+    """Leaves a file where it is unpickled."""
+
+    def __init__(self, mark: Path) -> None:
+        self.mark = mark
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os.mkdir, (str(self.mark),)
+
+
+def planted(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """Kernels that somebody else may have put there, with a right checksum and code of their own: they are not run."""
+    cache, mark = bench.folder / "planted", bench.folder / "was-run"
+    shutil.rmtree(cache, ignore_errors=True)
+    shutil.copytree(warm(bench), cache)
+    for path in cache.rglob("*.kernel"):
+        rest = path.read_bytes()[DIGEST : 2 * DIGEST] + pickle.dumps(_Planted(mark))
+        path.write_bytes(hashlib.sha256(rest).digest() + rest)
+    how = rng.choice(["all may write", "another's folder", "another's files", "relative"])
+    environment = with_cache(cache)
+    if how == "all may write":
+        for path in (cache, *cache.rglob("*")):
+            path.chmod(0o777)
+    elif how == "relative":
+        environment["NUMBA_CACHE_DIR"] = cache.name
+    elif os.geteuid() == 0:
+        for path in (cache, *cache.rglob("*")) if how == "another's folder" else cache.rglob("*.kernel"):
+            os.chown(path, STRANGER, STRANGER)
+    else:
+        how = "all may write"
+        cache.chmod(0o777)
+    end = bench.run(*STOP, env=environment)
+    row = bench.row([end], (0,), how=how)
+    ran = ["code of a planted kernel was run"] if mark.exists() else []
+    if mark.exists():
+        mark.rmdir()
+    return row | {"wrong": row["wrong"] + ran}
+
+
+# ------------------------------------------------------------------------------------------ bombs
+
+
+def _zipped(place: Path) -> Path:
+    """A trajectory of 2 GiB of zeros in some megabytes, whose columns differ in length."""
+    file = place / "bomb.npz"
+    header = np.lib.format.header_data_from_array_1_0(np.zeros(1)) | {"shape": (GIBIBYTE // 4,)}
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        with archive.open("t.npy", "w", force_zip64=True) as opened:
+            np.lib.format.write_array_header_1_0(opened, header)  # type: ignore[arg-type]
+            for _ in range(2 * 64):
+                opened.write(bytes(GIBIBYTE // 64))
+        with archive.open("x.npy", "w") as opened:
+            np.lib.format.write_array(opened, np.zeros(16))  # type: ignore[arg-type]
+    return file
+
+
+def _columns(place: Path) -> Path:
+    """A trajectory of 2e8 rows in a few kilobytes."""
+    import pyarrow
+    import pyarrow.parquet
+
+    file = place / "bomb.parquet"
+    rows = 10_000_000
+    table = pyarrow.table({name: np.zeros(rows) for name in ("t", "x")})
+    with pyarrow.parquet.ParquetWriter(file, table.schema, compression="zstd") as writer:
+        for _ in range(20):
+            writer.write_table(table, row_group_size=rows)
+    return file
+
+
+def _settings(place: Path, text: str) -> Path:
+    file = place / "bomb.toml"
+    file.write_text(text)
+    return file
+
+
+def _program(place: Path, text: str) -> Path:
+    file = place / "bomb.ngc"
+    file.write_text(text)
+    return file
+
+
+def _judged(file: Path) -> list[str]:
+    return ["verify", file.name, "a.ngc", "-q"]
+
+
+def _on_machine(file: Path) -> list[str]:
+    return ["plan", "a.ngc", "-m", file.name, "-q"]
+
+
+def _read(file: Path) -> list[str]:
+    return ["plan", file.name, "-q", "--method", "stop"]
+
+
+LINE = 10_000_000  # characters
+DEEP = 100_000  # brackets, tables, digits
+BOMBS: dict[str, Callable[[Path], list[str]]] = {
+    "npz": lambda place: _judged(_zipped(place)),
+    "parquet": lambda place: _judged(_columns(place)),
+    "toml, deep": lambda place: _on_machine(_settings(place, "[" + ".".join("a" * DEEP) + "]\n")),
+    "toml, wide": lambda place: _on_machine(_settings(place, "".join(f"[t{n}]\n" for n in range(DEEP)))),
+    "toml, nested": lambda place: _on_machine(_settings(place, "a = " + "[" * DEEP + "]" * DEEP)),
+    "toml, digits": lambda place: _on_machine(_settings(place, "dt = " + "9" * DEEP)),
+    "toml, large": lambda place: _on_machine(_settings(place, "# " + "a" * LINE)),
+    "line": lambda place: _read(_program(place, "G21 G90 F600\nG1 X" + "1" * LINE + "\n")),
+    "comment": lambda place: _read(_program(place, "G21 G90 F600\n(" + "a" * LINE + ")\nG1 X1\nM2\n")),
+    "words": lambda place: _read(_program(place, "G21 G90 F600\nG1" + " X1" * (LINE // 3) + "\nM2\n")),
+    "brackets": lambda place: _read(_program(place, "G21 G90 F600\nG1 X" + "[" * DEEP + "1" + "]" * DEEP + "\n")),
+    "loop": lambda place: _read(_program(place, "F600\no1 while [1]\nG1 X1\nX0\no1 endwhile\nM2\n")),
+    "calls": lambda place: _read(_program(place, "o1 sub\no1 call\no1 call\no1 endsub\nF600\no1 call\nM2\n")),
+}  # fmt: skip
+
+
+def bomb(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """A small file that asks for much: a sentence within some seconds and gigabytes. All kinds in turn."""
+    bench.turn = (bench.turn + 1) % len(BOMBS)
+    kind = list(BOMBS)[bench.turn]
+    words = BOMBS[kind](bench.folder)
+
+    def lower() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+
+    used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    end = bench.run(*words, preexec_fn=lower)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used
+    for path in bench.folder.glob("bomb.*"):
+        path.unlink()
+    allowed = (0,) if kind == "comment" else (2, 3)
+    return bench.row([end], allowed, bomb=kind, cpu=round(used, 1), words=len(end[1].split()))

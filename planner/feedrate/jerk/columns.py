@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.problem import FeedrateProblem
 
 
@@ -23,19 +23,27 @@ class ProblemColumns(NamedTuple):
     jerk: FloatArray
 
 
-def columns_of(problem: FeedrateProblem) -> ProblemColumns:
-    """The columns of a problem for the kernel."""
+def with_rows(problem: FeedrateProblem) -> Array | slice:
+    """(A,) which axes have rows, or all: not a limit of one's own that bounds the velocity alone."""
+    if problem.own_least is None:
+        return slice(None)
+    bounded = np.isfinite(problem.own_least[1:]).any(axis=0)
+    return np.append(np.ones(problem.machine_axes, dtype=bool), bounded)
+
+
+def columns_of(problem: FeedrateProblem, of: Array | slice = slice(None)) -> ProblemColumns:
+    """The columns of a problem for the kernel; `of` (A,): its axes."""
     return ProblemColumns(
         unit=float(problem.acceleration[: problem.machine_axes].max()),
         s=problem.s,
         x_max=problem.feed_sq_limit,
-        d1=problem.d1,
-        d2_left=problem.d2_left,
-        d2_right=problem.d2_right,
-        d3_left=problem.d3_left,
-        d3_right=problem.d3_right,
-        acceleration=acceleration_limits(problem),
-        jerk=problem.jerk_limit,
+        d1=problem.d1[:, of],
+        d2_left=problem.d2_left[:, of],
+        d2_right=problem.d2_right[:, of],
+        d3_left=problem.d3_left[:, of],
+        d3_right=problem.d3_right[:, of],
+        acceleration=acceleration_limits(problem)[:, of],
+        jerk=problem.jerk_limit[:, of],
     )
 
 

@@ -48,7 +48,7 @@ from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.chain import INTERVALS_MIN, Chain
-from planner.feedrate.jerk.columns import columns_of
+from planner.feedrate.jerk.columns import columns_of, with_rows
 from planner.feedrate.jerk.layout import Room
 from planner.feedrate.jerk.settings import WindowSettings
 from planner.feedrate.jerk.window import Window
@@ -75,11 +75,16 @@ class JerkLimited(WindowSettings):
             at = problem.s[problem.piece[short[0]]]
             sentence = f"piece {short[0]} (from s = {at:.6g} mm) has fewer than {INTERVALS_MIN} intervals; refine the grid"
             return FeedrateSolution.failed(problem, Status.INFEASIBLE, sentence, repr(self), 0.0)
-        profile = Window.at_rest(*problem.d1.shape)
-        columns, counted = columns_of(problem), _Counted(len(problem), progress)
+        of = with_rows(problem)
+        columns, counted = columns_of(problem, of), _Counted(len(problem), progress)
+        profile = Window.at_rest(*columns.d1.shape)
         chain = partial(Chain, solver=self, columns=columns, profile=profile, tell=counted.add)
         pieces = [chain(a, b - 1) for a, b in pairwise(problem.piece.tolist())]
         _solve(pieces, counted)
+        rows = profile.rows
+        if rows.shape[1] < len(problem.axes):
+            rows = np.zeros((len(problem), len(problem.axes), rows.shape[2]))
+            rows[:, of] = profile.rows
         stops = [stop for piece in pieces for stop in piece.stops]
         slower = max(piece.slower for piece in pieces)
         sentence = f"slowed by {slower - 1.0:.1e} to keep every limit; " if slower > 1.0 else ""
@@ -103,7 +108,7 @@ class JerkLimited(WindowSettings):
             acc_s=profile.u,
             jerk_s=profile.jerk,
             duration=profile.duration,
-            multipliers=Multipliers(rows=profile.rows, feed=profile.feed, dynamics=profile.dynamics),
+            multipliers=Multipliers(rows=rows, feed=profile.feed, dynamics=profile.dynamics),
         )
 
 

@@ -45,7 +45,7 @@ class _Rows:
     d2_right: FloatArray
     d3_left: FloatArray
     d3_right: FloatArray
-    # (3,) or (3, V) least bounds of velocity, acceleration and jerk that were met, inf where nothing is bounded
+    # (3,) or (3, V) least bounds of velocity, acceleration and jerk that were met, inf where nothing is bounded, or far beyond the axes
     least: FloatArray
     # acceleration and jerk: bounds at the points
     acceleration: FloatArray
@@ -156,7 +156,7 @@ class _Column(_Rows):
         limited = bool(np.isfinite(least[0]))
         short, jump = np.zeros(len(at)), np.zeros(len(at))
         if limited:
-            feed_sq, short, jump = _between(feed_sq, feed_sq_mid, real_sq, FAR * real.feed_sq, at)
+            feed_sq, short, jump = _between(feed_sq, feed_sq_mid, at, real_sq, FAR * real.feed_sq)
         # what the intervals can be run with, for the errors of their rows
         x = np.minimum(real.feed_sq, np.minimum(np.maximum(feed_sq[a], feed_sq[b]), feed_sq_mid))
         u = real.acceleration
@@ -166,11 +166,12 @@ class _Column(_Rows):
         third = size * real.jerk + 3.0 * np.abs(q_mid[1]) * v * u + np.abs(q_mid[2]) * v**3
         beyond_j = BEYOND * float(third.max(initial=1.0))
         acceleration, short_a, jump_a = _between(
-            np.minimum(bound[:, 1], beyond_a), np.minimum(bound_mid[:, 1], beyond_a), None, None, at
+            np.minimum(bound[:, 1], beyond_a), np.minimum(bound_mid[:, 1], beyond_a), at
         )
         jerk, short_j, jump_j = _between(
-            np.minimum(bound[:, 2], beyond_j), np.minimum(bound_mid[:, 2], beyond_j), None, None, at
+            np.minimum(bound[:, 2], beyond_j), np.minimum(bound_mid[:, 2], beyond_j), at
         )
+        least = np.where(least >= [np.inf, beyond_a, beyond_j], np.inf, least)
         strongest = np.minimum(np.minimum(acceleration[a], acceleration[b]), bound_mid[:, 1])
         with np.errstate(divide="ignore", invalid="ignore"):
             x = np.fmin(x, (strongest + size * u) / np.abs(q_mid[1]))
@@ -221,19 +222,22 @@ def _along(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray])
 
 
 def _between(
-    bound: FloatArray, middle: FloatArray, cap: FloatArray | None, cap_middle: FloatArray | None, at: Array
+    bound: FloatArray,
+    middle: FloatArray,
+    at: Array,
+    cap: FloatArray | float = np.inf,
+    beyond: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A bound (P,) kept between points, by how much it was short in the middles (n,), and how it changes.
 
-    cap, cap_middle : what else bounds the quantity: what is beyond does not count
+    cap, beyond : at the points and of the intervals, what the bound cannot be reached beyond: what it is there does not count
     """
-    if cap is not None and cap_middle is not None:
-        bound, middle = np.minimum(bound, cap), np.minimum(middle, cap_middle)
-    ends = bound[at], bound[at + 1]
+    bound = np.minimum(bound, cap)
+    middle, *ends = (np.minimum(one, beyond) for one in (middle, bound[at], bound[at + 1]))
     share = np.minimum(2.0 * middle / (ends[0] + ends[1]), 1.0)
     least = np.minimum(np.minimum(*ends), middle)
     jump = 1.0 - least / np.maximum(np.maximum(*ends), middle)
     found = bound.copy()
-    for side, end in zip((at, at + 1), ends, strict=True):
-        np.minimum.at(found, side, np.where(jump > JUMP, least, share * end))
+    for side in (at, at + 1):
+        np.minimum.at(found, side, np.where(jump > JUMP, least, share * bound[side]))
     return found, 1.0 - share, jump

@@ -126,3 +126,30 @@ def test_points_beside_a_jump_are_not_nearer_than_rounding_tells_apart(program):
     before, after, _ = grid_and_problem(program, MILL.with_own([Jump()]))
     shortest = [np.diff(samples.s)[samples.intervals].min() for samples in (before, after)]
     assert shortest[1] > SWITCH_MIN * shortest[0]
+
+
+@pytest.mark.parametrize("push", [np.inf, 1e9], ids=["velocity", "acceleration"])
+def test_what_never_binds_leaves_grid_and_profile_alone(program, push):
+    """On a bend, where what the axes allow changes from point to point: no point and no row more."""
+
+    class Never(PathLimit):
+        name = "never"
+
+        def velocity(self, at):
+            return 1e4
+
+        def acceleration(self, at):
+            return push
+
+    toolpath = toolpath_from_program(program, MILL)
+    path = round_corners(toolpath, MILL, BezierCorner(), blend_tangents=True)
+    found = []
+    for machine in (MILL, MILL.with_own([Never()])):
+        samples = sample_path(path, machine, third_order=True)
+        problem = feedrate_problem(samples, machine)
+        found.append((samples.s, THIRD_ORDER[OWN].solve(problem)))
+    (s, plain), (s_never, never) = found
+    np.testing.assert_array_equal(s, s_never)
+    np.testing.assert_array_equal(plain.feed_sq, never.feed_sq)
+    assert never.multipliers.rows.shape[1] == plain.multipliers.rows.shape[1] + 1
+    assert not never.multipliers.rows[:, -1].any()

@@ -35,7 +35,9 @@ def passed(motion: Motion, vertices: Array, within: Array) -> tuple[Array, Array
     """
     p = motion.position
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1)))
-    near = _in_order(_chord_distances(p, vertices), within)
+    # distances of chords say nothing of the order within one: of long ones too little is asked, of places between setpoints too much
+    squares = _chord_distances(p, vertices), ((p - vertices[:, None]) ** 2).sum(axis=2)
+    near = np.concatenate([_in_order(square, within) for square in squares])
     chords = np.unique(np.clip(near[:, None] + np.arange(-AROUND, AROUND + 1), 0, len(p) - 2))
     w = np.linspace(0.0, 1.0, FINE + 1)[1:]
     places, low, high = (

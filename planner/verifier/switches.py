@@ -41,8 +41,9 @@ CHORD = np.dtype(
     [(name, "i8") for name in ("first", "count", "offset")]
     + [(name, "f8") for name in ("begin", "step", "h", "cut", "error")]
 )
-# In `state`: the first vertex not settled; first and behind the last of the chords kept; marks used.
-OPEN, HEAD, TAIL, USED = range(4)
+# In `state`: the first vertex not settled; first and behind the last of the chords kept; marks used; the last vertex that is
+# passed; how many chords there may be before it is tried again to settle those that are passed.
+OPEN, HEAD, TAIL, USED, PASSED, PATIENCE = range(6)
 SURE, TRAVELLED, JUDGED = range(3)  # in `along`: the open vertex is not passed, length run, judged to [mm]
 # Price of a full stop passed where the motion does not rest [budgets]: more than of all vertices around.
 RUN_THROUGH = 1e3
@@ -84,7 +85,7 @@ class Passing(NamedTuple):
     """Where a motion passes the vertices, as far as its samples tell.
 
     switch  : (N+1,) `SWITCH`
-    state   : (4,) as named above
+    state   : (6,) as named above
     along   : (3,) likewise; its last number is for who judges, and what is judged stays
     work    : (A,) a place that is worked with
     chord, ends, mark : chords since the last vertex that was settled: `CHORD` (C,), position and its derivatives at
@@ -107,7 +108,7 @@ class Switches:
         vertices, axes = pieces.vertex.shape
         switch = np.zeros(vertices, dtype=SWITCH)
         switch["cost"][1:] = np.inf
-        whole = switch, np.array([1, 0, 0, 0], dtype=np.int64), np.zeros(3), np.zeros(axes)
+        whole = switch, np.array([1, 0, 0, 0, 0, 0], dtype=np.int64), np.zeros(3), np.zeros(axes)
         kept = np.zeros(ROOM, CHORD), np.zeros((ROOM, 2, 4, axes)), np.zeros(ROOM, np.bool_)
         self._pieces, self._bounds, self.found = pieces, bounds, Passing(*whole, *kept)
 
@@ -123,7 +124,8 @@ class Switches:
         """No more samples: settle what was looked at."""
         seen = np.flatnonzero(np.isfinite(self.found.switch["cost"][:-1]))
         if len(seen) and seen[-1] >= self.found.state[OPEN]:
-            _settle(self._pieces, self.found, int(seen[-1]), self._bounds)
+            self.found.state[PASSED] = seen[-1]
+            _settle(self._pieces, self.found, self._bounds)
 
     def _make_room(self) -> None:
         """Leave out chords and marks not needed any more; twice the room where they are not half of them."""
@@ -159,14 +161,22 @@ def _passed(pieces: ProgramPieces, found: Passing, new: Chords, skip: int, bound
             error_sq += error * error
         step, rounding = math.sqrt(step_sq), math.sqrt(error_sq)
         last = min(new.last[k] + 1, len(switch) - 2)
-        if state[TAIL] == len(found.chord) or state[USED] + max(last + 1 - state[OPEN], 0) > len(found.mark):
+        first = max(state[OPEN], state[PASSED] + 1)
+        if state[TAIL] == len(found.chord) or state[USED] + max(last + 1 - first, 0) > len(found.mark):
             return k
         along[TRAVELLED] += step
         new.place[k], new.error[k] = along[TRAVELLED], rounding
         if step > 0.0:
             _look(pieces, found, new, k, last, (begin, step, h, new.cut[k], rounding), bounds)
-        if k and new.first[k] >= state[OPEN]:
-            _settle(pieces, found, min(new.first[k], len(switch) - 2), bounds)
+        gone = min(new.first[k], len(switch) - 2)
+        if (
+            k
+            and gone >= state[OPEN]
+            and (gone > state[PASSED] or state[TAIL] - state[HEAD] > state[PATIENCE])
+        ):
+            state[PASSED] = max(gone, state[PASSED])
+            _settle(pieces, found, bounds)
+            state[PATIENCE] = 2 * (state[TAIL] - state[HEAD])
     return n
 
 
@@ -191,9 +201,10 @@ def _look(
 ) -> None:
     """Which vertices, from the open one to `last`, the chord to sample k is a better place for."""
     switch, state, along = found.switch, found.state, found.along
-    first, at, before = state[OPEN], state[TAIL], 0.0
+    first, at = max(state[OPEN], state[PASSED] + 1), state[TAIL]
     if last < first:
         return
+    before = switch[first - 1]["cost"] if first > state[OPEN] else 0.0
     _, step, h, cut, rounding = chord
     bow = bounds.acceleration * h * h / 8.0
     for i in range(first, last + 1):
@@ -211,7 +222,7 @@ def _look(
         found.mark[state[USED] + i - first] = better
         before = switch[i]["cost"]
     # nearer than ever, and no other vertex: what was before does not matter
-    if last == first and found.mark[state[USED]]:
+    if last == state[OPEN] and found.mark[state[USED]]:
         at = state[HEAD] = 0
         found.mark[0], state[USED], along[SURE] = True, 0, chord[0]
     _put_ends(found.ends[at], new, k)
@@ -222,41 +233,70 @@ def _look(
     state[USED] += last + 1 - first
 
 
+@kernel(inline=True)
+def _latest(found, i, at):
+    """The last chord up to `at` that is a better place for vertex i than all before it, -1 where there is none."""
+    while at >= found.state[HEAD]:
+        row = found.chord[at]
+        behind = i - row["first"]
+        if 0 <= behind < row["count"] and found.mark[row["offset"] + behind]:
+            return at
+        at -= 1
+    return -1
+
+
 @kernel()
-def _settle(pieces: ProgramPieces, found: Passing, last: int, bounds: Bounds) -> None:
-    """The vertices up to `last` are passed where the chords so far have them, with those behind that were
-    looked at; what has been judged stays."""
+def _settle(pieces: ProgramPieces, found: Passing, bounds: Bounds) -> None:
+    """Settle the vertices that are passed, up to the first one of which the place still depends on how the motion goes on; what has
+    been judged stays.
+
+    However that is, it is on a piece after the last vertex that is passed or on a later one: the place is the same whichever it is
+    where it is the same for the first and for the last of these pieces that there can be, since the more vertices are passed
+    until now, the earlier all of them are. Vertices whose places are not in order are settled together.
+    """
     switch, state, along = found.switch, found.state, found.along
-    first, at, head = state[OPEN], state[TAIL] - 1, state[HEAD]
+    first, last, at = state[OPEN], state[PASSED], state[TAIL] - 1
     top = last
     while top + 1 < len(switch) - 1 and switch[top + 1]["cost"] < np.inf:
         top += 1
     for i in range(top, first - 1, -1):
-        here = at
-        while here >= state[HEAD]:
+        here = _latest(found, i, at)
+        switch[i]["chord"], at = here, here if here >= 0 else at
+    at = state[TAIL] - 1
+    while last >= first:
+        here = _latest(found, last, at)
+        if here == switch[last]["chord"]:
+            break
+        last, at = last - 1, here if here >= 0 else at
+    i = first
+    while i <= last or (first <= last and i <= top and _begin(found, i) <= switch[i - 1]["place"]):
+        here = switch[i]["chord"]
+        switch[i]["place"], switch[i]["end"], switch[i]["group"] = along[SURE], 0.0, 1  # where it is not seen
+        if here >= 0:
             row = found.chord[here]
-            behind = i - row["first"]
-            if 0 <= behind < row["count"] and found.mark[row["offset"] + behind]:
-                break
-            here -= 1
-        if i <= last:
-            switch[i]["place"], switch[i]["end"], switch[i]["begin"] = -1.0, 0.0, 0.0  # not seen
-        if here < state[HEAD]:
-            continue
-        at = here
-        if i > last:
-            continue
-        head = here if i == last else head
-        row = found.chord[here]
-        near = nearest(pieces.vertex[i], found.ends[here], row["cut"], row["h"])
-        switch[i]["place"], switch[i]["chord"] = row["begin"] + near[1] * row["step"], here
-        if pieces.piece[i - 1]["feed"] != pieces.piece[i]["feed"]:
-            switch[i]["end"] = _reach(near, found.ends[here], row, bounds)
-    spent = switch[last]["cost"]
-    for i in range(first, last + 1):
-        switch[i]["place"] = max(switch[i]["place"], along[SURE])
-        switch[i]["group"] = 1
-        _pool(pieces, found, first, i, bounds)
+            near = nearest(pieces.vertex[i], found.ends[here], row["cut"], row["h"])
+            switch[i]["place"] = max(row["begin"] + near[1] * row["step"], along[SURE])
+            if pieces.piece[i - 1]["feed"] != pieces.piece[i]["feed"]:
+                switch[i]["end"] = _reach(near, found.ends[here], row, bounds)
+            _pool(pieces, found, first, i, bounds)
+        i += 1
+    seen = i
+    while last >= first and last + 1 < seen and switch[last]["place"] >= switch[last + 1]["place"]:
+        last -= 1
+    if last >= first:
+        _keep(found, first, last, top)
+
+
+@kernel(inline=True)
+def _begin(found, i):
+    """Where the chord begins on which vertex i is."""
+    return found.chord[found.switch[i]["chord"]]["begin"] if found.switch[i]["chord"] >= 0 else np.inf
+
+
+@kernel()
+def _keep(found: Passing, first: int, last: int, top: int) -> None:
+    """The vertices from `first` to `last` are settled, those up to `top` not yet."""
+    switch, state, along = found.switch, found.state, found.along
     for i in range(first, last + 1):
         place, reach = switch[i]["place"], switch[i]["end"]
         switch[i]["end"] = place + reach
@@ -266,11 +306,10 @@ def _settle(pieces: ProgramPieces, found: Passing, last: int, bounds: Bounds) ->
             switch[before]["begin"] = switch[i]["begin"]
             before -= 1
     along[SURE] = max(along[SURE], switch[last]["place"])
-    i = last + 1
-    while i < len(switch) and switch[i]["cost"] < np.inf and spent < np.inf:
+    spent = switch[last]["cost"]
+    for i in range(last + 1, top + 1):
         switch[i]["cost"] -= spent
-        i += 1
-    state[OPEN], state[HEAD] = last + 1, head
+    state[OPEN], state[HEAD] = last + 1, max(state[HEAD], switch[last]["chord"])
 
 
 @kernel(inline=True)
@@ -283,9 +322,10 @@ def _reach(near, ends, row, bounds):
 @kernel()
 def _pool(pieces: ProgramPieces, found: Passing, first: int, i: int, bounds: Bounds) -> None:
     """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed together,
-    where the motion is nearest to the mean of them; of chords that is known to two of them."""
+    where the motion is nearest to the mean of them; of chords that is known to two of them. How well single places are known
+    does not matter on cubics: they are ends of chords where they are out of order."""
     switch, state, work, n = found.switch, found.state, found.work, i
-    while n > first and switch[n]["place"] < switch[n - 1]["place"]:
+    while n > first and switch[n - 1]["chord"] >= 0 and switch[n]["place"] <= switch[n - 1]["place"]:
         n -= switch[n - 1]["group"]
         weight, reach, here = 0.0, 0.0, switch[i]["chord"]
         for m in range(n, i + 1):
@@ -303,7 +343,9 @@ def _pool(pieces: ProgramPieces, found: Passing, first: int, i: int, bounds: Bou
                     break
                 here, near = here + way, other
         row = found.chord[here]
-        own = 2.0 * row["step"] if math.isnan(row["cut"]) else _reach(near, found.ends[here], row, bounds)
+        own = _reach(near, found.ends[here], row, bounds)
+        if math.isnan(row["cut"]):
+            own = max(reach, 2.0 * row["step"])
         for m in range(n, i + 1):
             switch[m]["place"] = max(row["begin"] + near[1] * row["step"], found.along[SURE])
-            switch[m]["chord"], switch[m]["group"], switch[m]["end"] = here, i + 1 - n, max(reach, own)
+            switch[m]["chord"], switch[m]["group"], switch[m]["end"] = here, i + 1 - n, own

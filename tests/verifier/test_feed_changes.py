@@ -139,6 +139,41 @@ def test_vertices_passed_together_are_passed_at_the_nearest_place_to_all(seed):
     assert {fault.name for fault in wrong.faults} == {"feed"}
 
 
+def in_order(places):
+    """Non-decreasing numbers, of which the squares of the differences from `places` have the least sum."""
+    runs = []
+    for place in places:
+        runs.append([place])
+        while len(runs) > 1 and np.mean(runs[-2]) >= np.mean(runs[-1]):
+            last = runs.pop()
+            runs[-1] += last
+    return np.concatenate([np.full(len(run), np.mean(run)) for run in runs])
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_a_run_of_vertices_out_of_order_is_settled_as_a_whole(seed):
+    """Twenty vertices beside a straight motion, to and fro by nine tenths of the tolerance: F changes at one of them, at the place that
+    least squares in order give it, however many others were passed by then and however many are still to come."""
+    random = np.random.default_rng(seed)
+    tolerance = 10 ** random.uniform(-1.0, 0.3)
+    along = 4.0 + 0.5 * np.arange(20) + 0.9 * tolerance * random.uniform(-1.0, 1.0, 20)
+    beside = 0.2 * tolerance * random.uniform(-1.0, 1.0, 20)
+    change = int(random.integers(20))
+    rising = bool(random.integers(2))
+    feeds = (2.0, 40.0) if rising else (40.0, 2.0)
+    m = machine(dt=0.0005, tolerance=tolerance, acceleration=A)
+    moves = Moves()
+    for k, (x, y) in enumerate(zip(along, beside, strict=True)):
+        moves = moves.line(x, y, feed=feeds[int(k > change)])
+    toolpath = moves.line(20.0, 0.0, feed=feeds[1]).toolpath(m)
+    place, way = in_order(along)[change], -1.0 if rising else 1.0
+    for shift, keeps in ((0.0, True), (way * TOO_SOON, False), (-way * TOO_SOON, True)):
+        motion = Straight(feeds, (place + shift, 20.0))
+        samples = sample((motion.end, motion), m.dt)
+        seen = verify(samples, toolpath, m, motion=motion, not_limited=("jerk",), seed=seed)
+        assert {fault.name for fault in seen.faults} == (set() if keeps else {"feed"})
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_the_nearest_place_is_that_of_ten_thousand_places(seed):
     random = np.random.default_rng(seed)

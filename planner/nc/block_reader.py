@@ -104,6 +104,9 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
         if code == FAULT:
             if homed(words, word, block, ignored) or command(words, word, block, ignored):
                 break
+            if "spindle" in block.m and words.text(word) in ("I", "i") and not ignored.strict:
+                ignored.count(settings.SPINDLE_WORD, "I", block.line)  # of Marlin: S of each move
+                continue
             report(word, unreadable(words, word))
             return None
         letter = chr(code)
@@ -122,7 +125,7 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
         elif letter == "O":
             if not _program_number(words, word, last, block, report, ignored):
                 return None
-        elif letter == "N":
+        elif letter == "N" and "N" not in owned:
             if word > first:
                 report(word, "a line number comes first on its line, once")
                 return None
@@ -252,4 +255,4 @@ def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWord
             ignored.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)
         elif ignored.treatment[ord(letter)] != LEFT_OUT:
             report(block.at[letter], unused(letter))
-        del block.value[letter]
+        block.idle[letter] = block.value.pop(letter)

@@ -125,47 +125,43 @@ class Assumption:
         return f"{times:,} " + _ONE_OR_MANY.sub(lambda both: both[1 if times == 1 else 2], self.name)
 
 
-_PROBE = Refusal(
-    "a probing move, whose end only the machine knows, is", "plan the parts before and after it", True
+# G codes in tenths that are refused, what they are, and what to do. Axis words beside them are their own, but for G51.
+# fmt: off
+_REFUSED = (
+    ((60, 61), "a spline or transformation is", _STRAIGHT),
+    ((310, 350, 360, 361, 370, 380, 382, 383, 384, 385, 1360), "a probing move, whose end only the machine knows, is",
+     "plan the parts before and after it"),
+    ((1500,), "a pocket round the contour of a subprogram, whose single passes are the control's, is",
+     "let the CAM system write them; G13 reads a round pocket, G41 and M98 P its contour alone"),
+    ((842, 843, 1740, 1840), "tapping of that kind is", "write G84 or G74"),
+    ((71, 1070), "a contour round a cylinder is", "write the angles of the rotary axis"),
+    ((121,), "milling in x and the angle of a spindle is", "write the moves in X and Y, or X and C"),
+    ((542, 2540, 2680), "a frame that follows the rotary axes is", "write G68.2, or G43.4"),
+    ((22, 23, 24, 32, 33, 34), "an involute, a spiral or an arc in space is", _STRAIGHT),
+    ((440,), "taking the length of a tool off is", "write G43, with the other sign in [tools]"),
+    ((450, 460, 480), "a move that is longer by the offset of a tool is", _STRAIGHT),
+    ((470,), "engraving a text (Haas), or a move that is shorter by the offset of a tool (Fanuc), is", _STRAIGHT),
+    ((661,), "a macro that each block calls is", "write its calls as G65"),
+    ((770,), "a bore from below by I is", "write G87 with I J K"),
+    ((535,), "a move in coordinates of Mazatrol is", "write G53 or G54"),
+    ((2340,), "the tool centre point of Haas is", "write G43.4 H, with [kinematics] in the machine file"),
+    ((412, 413, 414, 415, 422, 424, 425, 1410, 1430), "tool compensation in five axes is", _ANGLES),
+    ((435,), "the tool's direction as a vector (G43.5 with I J K) is", _ANGLES),
+    ((270, 290, 600), "a move by way of a reference point is", "write G0 to its end"),
+    ((150,), "a G code that RS274NGC does not know (Okuma's G15 H is a work system) is", "write G54 to G59, or G54.1 P"),
+    ((500,), "presetting coordinates with G50 is", "write G92"),
+    ((510,), "scaling is", "write the scaled coordinates out"),
+    ((680, 690), "rotating the coordinate system is", "write the rotated coordinates out"),
+    ((721, 722), "a copy of a subprogram (Fanuc), or a lathe cycle (LinuxCNC), is", _STRAIGHT),
+    ((700, 710, 711, 712, 720), "a lathe cycle is", _STRAIGHT),
 )
-G_REFUSED: dict[int, Refusal] = {
-    **dict.fromkeys((60, 61), Refusal("a spline or transformation is", _STRAIGHT, True)),
-    **dict.fromkeys((380, 382, 383, 384, 385), _PROBE),
-    **dict.fromkeys((310, 350, 360, 361, 370), _PROBE),
-    1500: Refusal(
-        "a pocket round the contour of a subprogram, whose single passes are the control's, is",
-        _STRAIGHT,
-        True,
-    ),
-    470: Refusal("engraving a text is", _STRAIGHT, True),
-    **dict.fromkeys((842, 843, 1740, 1840), Refusal("tapping of that kind is", "write G84 or G74", True)),
-    1070: Refusal("a contour round a cylinder is", "write the angles of the rotary axis", True),
-    **dict.fromkeys(
-        (2540, 2680), Refusal("a frame that follows the rotary axes is", "write G68.2, or G43.4", True)
-    ),
-    2340: Refusal(
-        "the tool centre point of Haas is", "write G43.4 H, with [kinematics] in the machine file", True
-    ),
-    **dict.fromkeys((1410, 1430), Refusal("tool compensation in five axes is", _ANGLES, True)),
-    **dict.fromkeys(
-        (270, 290, 600), Refusal("a move by way of a reference point is", "write G0 to its end", True)
-    ),
-    150: Refusal(
-        "a G code that RS274NGC does not know (Okuma's G15 H is a work system) is",
-        "write G54 to G59, or G54.1 P",
-        True,
-    ),
-    435: Refusal("the tool's direction as a vector (G43.5 with I J K) is", _ANGLES, True),
-    500: Refusal("presetting coordinates with G50 is", "write G92", True),
-    510: Refusal("scaling is", "write the scaled coordinates out"),
-    **dict.fromkeys(
-        (680, 690), Refusal("rotating the coordinate system is", "write the rotated coordinates out", True)
-    ),
-    **dict.fromkeys((700, 710, 711, 712, 720, 721, 722), Refusal("a lathe cycle is", _STRAIGHT, True)),
-}
+# fmt: on
+G_REFUSED = {code: Refusal(what, remedy, code != 510) for given, what, remedy in _REFUSED for code in given}
 M_REFUSED: dict[int, Refusal] = {
     **dict.fromkeys((700, 710, 720, 730), Refusal("saving and restoring modes is", "write the modes out")),
     **dict.fromkeys((980, 990), Refusal("a subprogram is", "write its blocks out")),
+    1980: Refusal("a subprogram on another device is", "put its file beside the program and write M98"),
+    960: Refusal("a jump that an input decides is", "plan the parts before and after it"),
 }
 
 

@@ -52,6 +52,7 @@ _STEPS = {
 }
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _DEEP, _BACK_BORE, _BY_HAND = 830, 870, 880  # G83, G87, G88
+_GROUP = "K of G73"  # among the words in force
 _PECK_ODD = 10.0  # times the depth of a hole: a longer peck is most likely in other units
 _PER_HOLE = 16  # steps of a hole without pecks, at most
 _PER_PECK = 3  # down, out and back in
@@ -71,6 +72,7 @@ class Hole:
     peck: float = 0.0  # Q, or I of G83, of which each is J (`less`) less, down to K (`least`);  dwell : P [s]
     less: float = 0.0
     least: float = 0.0
+    group: float = 0.0  # K of Haas' G73: pecks of this depth together end at R
     dwell: float = 0.0
     beside: tuple[float, float] = (0.0, 0.0)  # (a, b) offset of G87;  counterbore : c of its K
     counterbore: float = 0.0
@@ -116,11 +118,13 @@ def steps(hole: Hole) -> Iterator[CycleStep]:
 
 def _pecks(hole: Hole) -> Iterator[CycleStep]:
     a, b = hole.place
-    step, depth = hole.peck, hole.clear - hole.peck
+    step, depth, since = hole.peck, hole.clear - hole.peck, 0.0
     while depth > hole.bottom:
         yield CycleStep(Kind.LINE, (a, b, depth))
-        if hole.code == _DEEP:
+        since += step
+        if hole.code == _DEEP or 0.0 < hole.group <= since + _ROUNDING:
             yield CycleStep(Kind.RAPID, (a, b, hole.clear))
+            since = 0.0
         yield CycleStep(Kind.RAPID, (a, b, depth + CLEARANCE / hole.unit))
         step = max(step - hole.less, hole.least)
         depth -= step
@@ -199,6 +203,7 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
         clear,
         retract=series.level if to_level and series.level > clear else clear,
         **_infeeds(words, state),
+        group=series.words.get(_GROUP, 0.0),
         dwell=words.get("P", 0.0 if state.motion in FANUC_DWELLS else state.cycle_dwell),
         beside=(words.get("IJK"[a], 0.0), words.get("IJK"[b], 0.0)),
         counterbore=words.get("IJK"[axis], 0.0) + (0.0 if state.absolute else bottom),
@@ -227,7 +232,14 @@ def _repeats(state: State, block: Block, hole: Hole) -> int:
 
 def _counts(state: State, block: Block) -> bool:
     """True if K is how many holes, as Fanuc has it."""
-    return state.fanuc and state.motion != _BACK_BORE and not ("I" in block.value or "J" in block.value)
+    others = "I" in block.value or "J" in block.value or _groups(state, block)
+    return state.fanuc and state.motion != _BACK_BORE and not others
+
+
+def _groups(state: State, block: Block) -> bool:
+    """True if K is a depth of Haas' G73: in G90, where Fanuc would drill the same hole again, and above Q."""
+    together = state.fanuc and state.absolute and state.motion == min(PECKING) and block.has("Q")
+    return together and block.value.get("K", 0.0) > block.value["Q"] > 0.0
 
 
 def _say(state: State, block: Block, findings: Findings) -> None:
@@ -240,6 +252,9 @@ def _say(state: State, block: Block, findings: Findings) -> None:
         )
         text = f"holes end at {at}; some controls start with G9{9 if state.fanuc else 8}"
         findings.assume(f"{name} before any G98 or G99: {text}", block.line, word)
+    if _groups(state, block):
+        text = f"K{block.value['K']:g} beside Q is the depth after which it retracts to R, as Haas has it"
+        findings.assume(f"{name}: {text}; Fanuc would drill the hole again", block.line, block.at["K"])
     if state.motion == _BY_HAND:
         text = "the operator retracts the tool after the full stop; the plan has a rapid for it"
         findings.assume(f"{name}: {text}", block.line, word)
@@ -262,6 +277,8 @@ def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
         if not state.fanuc and letter in codes.FANUC_WORDS.get(code, ""):
             raise block.fault(unused(letter), letter)
         series.words[letter] = block.value[letter]
+        if letter == "K":
+            series.words[_GROUP] = block.value["K"] if _groups(state, block) else 0.0
         if state.fanuc and not state.absolute:  # levels stay where they were when they were given
             series.words[letter] += {"R": series.level, axis: series.words.get("R", 0.0)}.get(letter, 0.0)
     if state.fanuc:

@@ -252,6 +252,7 @@ class Interpreter:
                 self.saved.take(setting, self.state, self.table, block.line)
             else:
                 self.limits.take(setting, self.state, self.table, block.line, self.findings)
+        mover.check_offsets(self.state, block, compensated=self.mover.cutter is not None)
         self.state.numbers |= {c: block.value[c] for c in block.value.keys() & {"D", "H"}}
         auxiliary.set_feed(self.state, block, self.findings)
         self._timed |= self.state.feed_mode == "inverse time"

@@ -49,6 +49,18 @@ def check_unchanged(state: State, block: Block) -> None:
         raise block.fault(_refusal("M6"), "tool change")
 
 
+def check_offsets(state: State, block: Block, *, compensated: bool) -> None:
+    """Raise WordFault for a D or H alone that would bring another offset in on Fanuc's controls."""
+    changed = {"cutter compensation", "tool length"} & block.g.keys()
+    for letter, code, on in (("H", "G43", bool(state.tool_offset.any())), ("D", "G41 or G42", compensated)):
+        number = block.idle.get(letter, block.value.get(letter))
+        before = state.numbers.get(letter)
+        idle = state.fanuc and on and letter not in block.uses and not changed
+        if idle and number is not None and before is not None and number != before:
+            text = f"{letter}{number:g} while {letter}{before:g} is in force: the control takes its offset from here on"
+            raise block.fault(f"{text}; write {code} beside it", letter)
+
+
 def _refusal(name: str) -> str:
     return f"{name} while cutter radius compensation is on; write G40 before it"
 

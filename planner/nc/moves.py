@@ -59,6 +59,7 @@ class Block:
     homing: str = ""  # axes that go to their home position
     stops: bool = False  # one of `events` is a full stop
     settings: list[Setting] = field(default_factory=list)  # commands that set a factor or a limit
+    idle: dict[str, float] = field(default_factory=dict)  # words that no code of the line uses, by letter
     uses: frozenset[str] = frozenset()  # letters of the words that codes of the line use
     tool_point: int | None = None  # number of the M code that switches the tool centre point, or None
 

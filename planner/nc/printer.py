@@ -35,8 +35,9 @@ _LETTER = re.compile(r"([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+)|)")
 # G codes that are read as in any program, by number; of the others those that level, wipe, park or probe.
 _ANY = frozenset((0, 1, 2, 3, 4, 5, 10, 11, 17, 18, 19, 20, 21, *range(52, 60), 90, 91, 92, 93, 94))
 _LEVELS = frozenset(  # G0 and G1 of RepRapFirmware with H, which end at a switch, among them
-    (0, 1, 12, *range(26, 36), 39, 42, 76, *range(80, 90), 130, 150, 212, 280, 375, 380, 383, 392, 425, 9111)
+    (0, 1, 12, *range(26, 36), 39, 42, 76, *range(80, 90), 130, 150, 212, 280, 375, 380, 383, 392, 425)
 )
+_BAMBU = 1000  # G2811, G9111 and others from here on, too
 _STOPPING = {"M0": 0, "M1": 10, "M2": 20, "M30": 300}
 _HOMING = ("G28", "G161", "G162")
 # Commands that set coordinates, or keep them (saved_states.py).
@@ -124,7 +125,7 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
     if words.letter[word] == ord("N") and word + 1 < words.first[row + 1]:
         word += 1
     found = command_of(words.row_text(row))
-    if found is None or found.name in _REFUSED:
+    if found is None or (found.name in _REFUSED and not ignored.ignores(found.name)):
         return False
     name, values = found.name, found.values()
     code = -1 if found.extended or len(name) == 1 else int(name[1:].partition(".")[0])
@@ -173,7 +174,7 @@ def _meaning(found: Command, code: int, ignored: IgnoredWords) -> tuple[Assumpti
         ignored.extruder = name if name[0] == "T" else ""
         return (settings.TOOLS if changed else settings.PRINTER_M), changed
     if name[0] == "G":
-        return (settings.LEVELLING if code in _LEVELS else None), True
+        return (settings.LEVELLING if code in _LEVELS or code >= _BAMBU else None), True
     if 3 <= code <= 9 or (code in _CALLS and '"' not in found.rest):
         return None, False
     what, stops = settings.meaning(code)

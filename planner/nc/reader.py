@@ -38,6 +38,7 @@ from planner.nc.reading import (
     SIEMENS,
     Reading,
 )
+from planner.nc.unreadable import refuse_models
 
 _WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program begins, and hardly a file name
 
@@ -103,7 +104,7 @@ def interpret(
     data = text.encode("utf-8", "replace") if isinstance(text, str) else text
     if are_points(data):
         return read_points(data, source), ()
-    detect.refuse_models(data, source)
+    refuse_models(data, source)
     _check_text(data, source)
     if detect.is_plotter_file(data, source):
         from planner.nc.hpgl.plotter import read_drawing  # 10 ms
@@ -182,6 +183,9 @@ def execute(
         reading.dialect == FANUC or dialect in (FANUC, LATHE) or detect.is_fanuc(words, dialect, reading)
     )
     interpreter.state.centres_known = dialect == SIEMENS
+    if dialect == SIEMENS and detect.has_two_axes(words) and b"DIAM" not in data.upper():
+        text = "X is a radius, though nothing moves Y: many lathes begin with DIAMON (diameters)"
+        interpreter.findings.assume(text, int(words.line[0]), grave=True)
     interpreter.state.plane_known = not interpreter.state.fanuc or dialect == LATHE
     interpreter.state.seconds_meant = reading.dialect != AUTO or dialect == SIEMENS or interpreter.state.fanuc
     integers = integers_of(machine)

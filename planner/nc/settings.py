@@ -17,7 +17,7 @@ from planner.nc.codes import G_GROUP, M_GROUP, M_REFUSED, Assumption
 
 AXES = "XYZABCUVW"
 _MOVED = frozenset(AXES + "IJK")
-EVERYTHING = "ABCDEFHIJKLPQRSTUVWXYZ"
+EVERYTHING = "ABCDEFHIJKLNPQRSTUVWXYZ"
 # Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, and settings of grbl with
 # what they limit.
 SETS_LIMITS = frozenset((201, 202, 203, 204, 220))
@@ -37,60 +37,36 @@ GRBL = {
     for name in names
 }
 CORNERS = "no limit of this plan, which goes around corners within the tolerance and the machine's acceleration and jerk"
-UNKNOWN_M = Assumption(
-    "M code{|s} that this reader does not know", "assumed not to move anything", changes=True
-)
-TOOL_POINT_M = Assumption(
-    "switch{|es} to the tool centre point, as some controls have {it|them} (M128, M428)",
-    "not followed: every axis is planned as a joint, and with the switch on the tool takes another path",
-    changes=True,
-)
+# fmt: off
+UNKNOWN_M = Assumption("M code{|s} that this reader does not know", "assumed not to move anything", changes=True)
+TOOL_POINT_M = Assumption("switch{|es} to the tool centre point, as some controls have {it|them} (M128, M428)",
+                          "not followed: every axis is planned as a joint, and with the switch on the tool takes another path",
+                          changes=True)
 # M codes that switch the tool centre point on and off, by number: Heidenhain's and LinuxCNC's.
 TOOL_POINT_ON, TOOL_POINT_OFF = (128, 428), (129, 429)
 _TOOL_LENGTH_POINT = 434  # G43.4, read where the machine has kinematics
-PRINTER_M = Assumption(
-    "code{|s} of a 3-D printer that move{s|} nothing",
-    "temperatures, fans, messages; they take no time in this plan",
-)
-WAIT_M = Assumption(
-    "wait{|s} for a temperature", "full stops; how long they last no plan knows", changes=True
-)
+PRINTER_M = Assumption("code{|s} of a 3-D printer that move{s|} nothing",
+                       "temperatures, fans, messages; they take no time in this plan")
+WAIT_M = Assumption("wait{|s} for a temperature", "full stops; how long they last no plan knows", changes=True)
 CORNER_M = Assumption("speed{|s} of corners (M205, M566)", CORNERS, changes=True)
-SCALE_M = Assumption(
-    "code{|s} of a 3-D printer that shift{s|} or scale{s|} its axes, or change{s|} how they move",
-    "not followed: positions are those of the program",
-    changes=True,
-)
+SCALE_M = Assumption("code{|s} of a 3-D printer that shift{s|} or scale{s|} its axes, or change{s|} how they move",
+                     "not followed: positions are those of the program", changes=True)
 SPINDLE_LIMIT = Assumption("largest spindle speed{|s}", "they change nothing in the path")
 PROBES = frozenset((310, 350, 360, 361, 370, *range(380, 386)))  # G31, G35 to G37, G38.2 to G38.5 in tenths
-PROBING = Assumption(
-    "probing move{|s}",
-    "left out, as --ignore says: a full stop; the axes are assumed to stay where they are",
-    changes=True,
-)
-SPINDLE_WORD = Assumption("P word{|s} beside M3 to M5", "power or gear of the spindle, left out")
+PROBING = Assumption("probing move{|s}",
+                     "left out, as --ignore says: a full stop; the axes are assumed to stay where they are", changes=True)
+SPINDLE_WORD = Assumption("word{|s} beside M3 to M5 (P, I)", "power, gear or mode of the spindle, left out")
+EXACT_STOP = Assumption("exact stop{|s} of one block (G9)", "a full stop behind it")
 LEFT_OUT_BY_USER = Assumption("word{|s}", "left out, as --ignore says")
 EXTRUDER_ZERO = Assumption("zero{|s} of the extruder", "left out with its words")
-RETRACTION = Assumption(
-    "retraction{|s} of an extruder (G10, G11)", "they take no time in this plan", changes=True
-)
-G_SETTING = Assumption(
-    "G code{|s} that set{s|} the control or cancel{s|} what this reader does not have",
-    "assumed not to move anything",
-    changes=True,
-)
+RETRACTION = Assumption("retraction{|s} of an extruder (G10, G11)", "they take no time in this plan", changes=True)
+G_SETTING = Assumption("G code{|s} that set{s|} the control or cancel{s|} what this reader does not have",
+                       "assumed not to move anything", changes=True)
 _STOPS = "a full stop; what it moves is not planned, and the head is assumed to come back"
-PARKS = Assumption(
-    "code{|s} that change{s|} or load{s|} filament, or park{s|} the head", _STOPS, changes=True
-)
+PARKS = Assumption("code{|s} that change{s|} or load{s|} filament, or park{s|} the head", _STOPS, changes=True)
 MACRO = Assumption("macro{|s} of the printer", _STOPS, changes=True)
-LEVELLING = Assumption(
-    "code{|s} of a 3-D printer that level{s|}, wipe{s|} or probe{s|}", _STOPS, changes=True
-)
-TOOLS = Assumption(
-    "change{|s} of the extruder (T)", "a full stop; what it moves and lasts is not planned", changes=True
-)
-# fmt: off
+LEVELLING = Assumption("code{|s} of a 3-D printer that level{s|}, wipe{s|} or probe{s|}", _STOPS, changes=True)
+TOOLS = Assumption("change{|s} of the extruder (T)", "a full stop; what it moves and lasts is not planned", changes=True)
 # M codes of printers by number: what is said of them. Waits and parking are full stops.
 _MEANING: dict[int, Assumption] = {
     **dict.fromkeys((
@@ -102,7 +78,7 @@ _MEANING: dict[int, Assumption] = {
     **dict.fromkeys((205, 566), CORNER_M),
     # Steps per mm and their parts, offsets, skew, scale, delta geometry, bed mesh, backlash, settings that are
     # loaded, shaping, and which carriage follows.
-    **dict.fromkeys((92, 206, 218, 350, 420, 425, 501, 502, 556, 579, 593, 605, 665, 666), SCALE_M),
+    **dict.fromkeys((92, 206, 218, 350, 420, 425, 501, 502, 556, 579, 593, 605, 665, 666, 667, 852), SCALE_M),
     **dict.fromkeys((125, 600, 701, 702), PARKS),
 }
 # Whose words are axes, which do not move.
@@ -153,6 +129,8 @@ def setting(letter: str, code: int, before: str, behind: str) -> CodeSetting | N
 def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
     if code == 220 and behind:
         return CodeSetting(G_SETTING, EVERYTHING)  # the limits of travel that it checks
+    if code == 90:
+        return CodeSetting(EXACT_STOP, "", stops=True)
     if _MOVED.intersection(before + behind):
         return None
     if code in (500, 920) and "S" in behind:
@@ -161,7 +139,7 @@ def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
         return CodeSetting(None, "EP")
     if code == 500 or (code in G_SETTINGS and not (code == 150 and "H" in behind)):
         return CodeSetting(G_SETTING, "DEHLPQRS")
-    if code in (100, 110) and "L" not in behind:
+    if code in (100, 110) and "L" not in behind and ("P" not in behind or "S" in behind):
         return CodeSetting(RETRACTION, "PRS")
     if code == 920 and "E" in behind:
         return CodeSetting(EXTRUDER_ZERO, "")

@@ -1,8 +1,10 @@
-"""What is said of text that is no word: characters, names of other controls, look-alikes of digits and signs."""
+"""What is said of files that are no programs, and of text that is no word: characters, names of other controls,
+look-alikes of digits and signs."""
 
 import re
 import unicodedata
 
+from planner.base.errors import InputError
 from planner.nc.codes import CHARACTERS
 from planner.nc.lexer import LINE_MAX, Unreadable, Words
 
@@ -25,25 +27,56 @@ _CAPITALS = dict(
 _LETTERS = re.compile(r"[A-Za-z][ \t]*[-+]?[\d.]*([OolI])[\d.]*(?![A-Za-z_=(])")
 _DIGITS = {"O": "0", "o": "0", "l": "1", "I": "1"}
 # How lines begin, whose they are, and what to do.
+# fmt: off
 _NAMES = (
-    (
-        r"(?:GOSUB|(?:END)?SUB|(?:END)?IF|(?:END)?WHILE|ELSE)\b",
-        "a subprogram or branch of EdingCNC's is not supported; write it as LinuxCNC has it, such as o100 sub and o100 call",
-    ),
-    (
-        r"(?:CALL|RTS|MODIN|MODOUT|NLAP|NOEX)\b|V[A-Z]*\d*\s*=|N[A-Z]+\d*\b",
-        "a word of Okuma's (OSP) is not supported; write the moves out, or post the program for a Fanuc control",
-    ),
-    (
-        r"(?:RECV|SEND|ECHO|ERROR|OK)\b",
-        "a line of what a terminal has recorded is no part of a program; give the program alone",
-    ),
+    (r"(?:GOSUB|(?:END)?SUB|(?:END)?IF|(?:END)?WHILE|ELSE)\b",
+     "a subprogram or branch of EdingCNC's is not supported; write it as LinuxCNC has it, such as o100 sub and o100 call"),
+    (r"(?:CALL|RTS|MODIN|MODOUT|NLAP|NOEX)\b|V[A-Z]*\d*\s*=|N[A-Z]+\d*\b",
+     "a word of Okuma's (OSP) is not supported; write the moves out, or post the program for a Fanuc control"),
+    (r"(?:RECV|SEND|ECHO|ERROR|OK)\b",
+     "a line of what a terminal has recorded is no part of a program; give the program alone"),
+    (r"(?:FORCE_MOVE|MANUAL_STEPPER)\b",
+     "a motor that turns by itself is not supported; write G1, or --ignore MANUAL_STEPPER where it is none of the axes"),
     (r"[A-Z_]{2}", "a word is a letter and a number; a name is none of RS274NGC"),
 )
-_CENTROID = (
-    "an M code of Centroid's with / moves until an input changes, waits for it or sets a home, as only the machine knows; plan "
-    "the parts before and after it"
+_CENTROID = ("an M code of Centroid's with / moves until an input changes, waits for it or sets a home, as only the machine knows; "
+             "plan the parts before and after it")
+# fmt: on
+LOOKED_AT = 20_000  # bytes at the start of a file that tell its language, and hold the first %
+_CAM = "make a program of it in a CAM system (for LinuxCNC, grbl or Mach3) and give that"
+# What only such a file has at its start, its name, what to do. Settings of grbl stand in programs too: a line with a G code
+# makes it one.
+# fmt: off
+_MODELS = (
+    (rb"\A\s*+(?>999[^\S\n]*\n[^\n]*\n\s*)*+0\s*\n\s*SECTION\b|\AAutoCAD Binary DXF", "a drawing (DXF)", _CAM),
+    (rb"(?i)\A\s*solid\b[^\n]*\n\s*(?:facet|endsolid)\b", "a model (STL)", _CAM),
+    (rb"\A\s*ISO-10303-21\s*;", "a model (STEP)", _CAM),
+    (rb"(?s)\A\s*+(?><\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*+<svg\b", "a drawing (SVG)", _CAM),
+    (rb"\A%PDF-\d", "a document (PDF)", _CAM),
+    (rb"\APK\x03\x04", "an archive (ZIP, 3MF)", "unpack it and give the program in it"),
+    (rb"(?m)^\[axes\.[a-z]\]", "a machine file", "give the program, and the machine file as -m FILE"),
+    (rb"(?m)^\[(?:EMC\w*|TRAJ|printer)\]|\A(?!(?:.*+\n)*?[ \t]*+(?:N\d++[ \t]*+)?G\d)(?:.*+\n)*?\$1[12]\d=",
+     "a file of a control's settings", "make a machine file of it (planner machine import) and give that as -m FILE"),
+    (rb"(?m)^(?:N\d+)?[ \t]*G30[ \t]+G1[789]\b|^N\d+[ \t]*[GTLXYZ]\d.*\*[ \t]*\r?$",
+     "a program of Heidenhain's in DIN/ISO, whose codes are others", "save it in plain text (.H) at the control or in CAM"),
+    (rb"(?m)^[ \t]*(?:N\d+[ \t]*)?\((?:[PM]?CALL[ \t]*\d+|RPT[ \t]*N\d|GOTO[ \t]*N\d|IF\b[^()]*\bGOTO[ \t]*N\d)",
+     "a program of Fagor's with calls and jumps in brackets", "post it for Fanuc, or write its moves out"),
 )
+# fmt: on
+# A binary STL: 80 bytes of any text, the number of triangles, 50 bytes for each.
+_STL_HEAD, _STL_TRIANGLE = 84, 50
+
+
+def refuse_models(data: bytes, source: str) -> None:
+    """Raise InputError for drawings, models, settings: files that people have beside their programs."""
+    head = data[:LOOKED_AT]
+    triangles = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
+    if triangles and len(data) == _STL_HEAD + _STL_TRIANGLE * triangles:
+        raise InputError(f"this is a model (STL), not a program; {_CAM}", source=source)
+    for mark, name, remedy in _MODELS:
+        if re.search(mark, head):
+            what = name if name.startswith("a program") else f"{name}, not a program"
+            raise InputError(f"this is {what}; {remedy}", source=source)
 
 
 def unreadable(words: Words, word: int) -> str:

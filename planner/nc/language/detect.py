@@ -12,16 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.errors import InputError
 from planner.machine import Machine
 from planner.nc.hpgl.instructions import CONTROL
 from planner.nc.lexer import FAULT, Words, split_words
 from planner.nc.printer import is_command
 from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, Reading
+from planner.nc.unreadable import LOOKED_AT
 
 # What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one
 # that fits nowhere is tried in 2^n ways, such as n comments in a file of no language.
-_LOOKED_AT = 20_000  # bytes at the start of a file that tell its language, and hold the first %
 _CONVERSATIONAL = re.compile(
     rb"^[ \t]*(?:\d+[ \t]+)?(BEGIN PGM|BLK FORM|TOOL CALL|TOOL DEF|CYCL DEF)\b|"
     rb"^[ \t]*\d+[ \t]+(?:L[ \t]+I?[XYZ][-+]|CC[ \t]+I?[XYZ][-+]|LBL[ \t]+\d)",
@@ -30,14 +29,14 @@ _CONVERSATIONAL = re.compile(
 # Marks of a Sinumerik's program, behind words of its line that all dialects have; texts of messages are none.
 _SIEMENS = re.compile(
     r"\s*(?:/\d?\s*)?(?!N?\d*\s*M(?:11[78]|2[38]|3[023])\b)(?:[A-NP-Z][-+]?(?:\d+\.?\d*|\.\d+)(?![\d.]*\s*=)\s*)*+(?:"
-    r"[A-Z_]{2}\w*:\s*(?:N\d+|[GXYZ][\d=]|[A-Z]\d+=)|(?:CR|AP|RP|RNDM?|CHF|CHR|ADIS(?:POS)?|TURN|[IJK]1|ANG|SPOSA?|FRCM?|FB|T|[SMH]\d+|R\d+|OFFN|OVR|[XYZABC]1|DISR|DISC|LIMS|[ABC]3|"
+    r"[A-Z_]{2}\w*:\s*(?:N\d+|[GXYZ][\d=]|[A-Z]\d+=)|(?:CR|A[PR]|RP|RNDM?|CHF|CHR|ADIS(?:POS)?|TURN|[IJK]1|ANG|SPOSA?|FRCM?|FB|T|[SMH]\d+|R\d+|OFFN|OVR|[XYZABC]1|DISR|DISC|LIMS|[ABC]3|"
     r"[XYZABCUVWIJKF])\s*=(?!=)|R\d+\s*=|(?:ACC|VELOLIM|FA|FL|SPOSA?|POSA?)\[|R\[[^\]#]*\]\s*=|"
     r"(?:MSG|CYCLE\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|WORKPIECE|SETMS|FGROUP|TRAORI|TRACYL|CASE|SETAL)\s*\(|"
     r"DEF\s+(?:CHAN\s+|NCK\s+)?(?:REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b|\$(?:AA|AC|P|TC|MN|MC|MA|SN|SC|A)_|%_N_|"
     r"(?:GOTO[FBC]|EXTCALL|PROC|EXTERN|CASE)\s|IF\b[^[#]*\bGOTO[FBC]\b|(?:FOR\s+\w+\s*=|CALL\s*\")|"
     r"(?:SUPA|CIP|CT|A?(?:TRANS|ROTS?|SCALE|MIRROR)|TRAORI|TRAFOOF|TRANSMIT|STOPRE|DIAM(?:ON|OF|90)|CFC|CFIN|CFTCP|KONT|NORM|"
     r"BRISK|SOFT|DRIVE|FFWO[NF]|COMP(?:ON|OF|CAD|CURV|SURF)|ORI(?:WKS|MKS|AXES|VECT|SON|SOF)|RTLIO[NF]|CDO[NF]2?|WALIMO[NF]|FNORM|"
-    r"UPATH|SPATH|ENDIF|ENDWHILE|ENDLOOP|ENDFOR|MCALL|[BAC]SPLINE|UNTIL|LOOP|INVCW|INVCCW|M17|RET)\b)",
+    r"UPATH|SPATH|ENDIF|ENDWHILE|ENDLOOP|ENDFOR|MCALL|[BAC]SPLINE|UNTIL|LOOP|INVCW|INVCCW|POLY|WHEN(?:EVER)?|DYN(?:NORM|POS|ROUGH|SEMIFIN|FINISH)|M17|RET)\b)",
     re.IGNORECASE,
 )
 # Marks of programs that are none of a Sinumerik's: a parameter, commands of Okuma's.
@@ -57,30 +56,7 @@ _HPGL = re.compile(_BEHIND_CONTROL + _FIRST + rb"(?=[-+.\d,;\s]|" + _FIRST + rb"
 _MACRO = re.compile(rb"\s*[A-Z]+_[A-Z]", re.IGNORECASE)  # PRINT_START of a printer
 _NC = re.compile(rb"\A(?>[%\s]|;[^\n]*|\([^)\n]*\)|/)*+[GMNOFST][ \t]*\d", re.IGNORECASE)
 PLOTTER_SUFFIXES = (".plt", ".hpgl", ".hpg", ".hgl", ".hp", ".plo")
-_CAM = "make a program of it in a CAM system (for LinuxCNC, grbl or Mach3) and give that"
-# name, what only such a file starts with, what to do
-_MODELS = (
-    (
-        "a drawing (DXF)",
-        rb"\A\s*+(?>999[^\S\n]*\n[^\n]*\n\s*)*+0\s*\n\s*SECTION\b|\AAutoCAD Binary DXF",
-        _CAM,
-    ),
-    ("a model (STL)", rb"(?i)\A\s*solid\b[^\n]*\n\s*(?:facet|endsolid)\b", _CAM),
-    ("a model (STEP)", rb"\A\s*ISO-10303-21\s*;", _CAM),
-    ("a drawing (SVG)", rb"(?s)\A\s*+(?><\?xml[^>]*>\s*|<!--.*?-->\s*|<!DOCTYPE[^>]*>\s*)*+<svg\b", _CAM),
-    ("a document (PDF)", rb"\A%PDF-\d", _CAM),
-    ("an archive (ZIP, 3MF)", rb"\APK\x03\x04", "unpack it and give the program in it"),
-    ("a machine file", rb"(?m)^\[axes\.[a-z]\]", "give the program, and the machine file as -m FILE"),
-    (
-        "a file of a control's settings",
-        # settings of grbl stand in programs too: a line with a G code makes it one
-        rb"(?m)^\[(?:EMC\w*|TRAJ|printer)\]|\A(?!(?:.*+\n)*?[ \t]*+(?:N\d++[ \t]*+)?G\d)(?:.*+\n)*?\$1[12]\d=",
-        "make a machine file of it (planner machine import) and give that as -m FILE",
-    ),
-)
 _CL_FILE = re.compile(rb"(?mi)^[ \t]*(?:GOTO|FROM|FEDRAT|MULTAX|LOADTL|PARTNO|CUTTER)[ \t]*/")
-# A binary STL: 80 bytes of any text, the number of triangles, 50 bytes for each.
-_STL_HEAD, _STL_TRIANGLE = 84, 50
 LATHE_NOTE = (
     "read as the program of a Fanuc or Haas lathe: X and U are diameters, U and W increments, feeds per turn until G98 "
     "([dialect] lathe = false in the machine file if it is none)"
@@ -104,7 +80,7 @@ _FRAME = re.compile(
 )
 _ENDS_FRAME = re.compile(r"G0*(?:15|50(?:\.1)?|53\.1|69|100)(?![\d.])")
 # Signs of lathes, and of others (`_has_signs`).
-_TOOL_AND_OFFSET = re.compile(r"T\d{4}", re.IGNORECASE)
+_TOOL_AND_OFFSET = re.compile(r"T(?:\d{4}|(\d)0\1)", re.IGNORECASE)
 _SPEED_MAX, _SURFACE_SPEED, _PER_TURN, _TOOL_CHANGE = 50.0, 96.0, 99.0, 6.0
 _RETRACTING = (73.0, 74.0, 76.0, *(float(n) for n in range(81, 90)))
 _OF_OTHERS = (7.0, 8.0, 17.0, 19.0, 93.0, 95.0)
@@ -148,20 +124,9 @@ def units(words: Words) -> list[int]:
     return [word for word in found if set(words.of_rows(words.row(word))[0].tolist()) <= _BESIDE_UNITS]
 
 
-def refuse_models(data: bytes, source: str) -> None:
-    """Raise InputError for drawings, models, settings: files that people have beside their programs."""
-    head = data[:_LOOKED_AT]
-    triangles = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
-    if triangles and len(data) == _STL_HEAD + _STL_TRIANGLE * triangles:
-        raise InputError(f"this is a model (STL), not a program; {_CAM}", source=source)
-    for name, mark, remedy in _MODELS:
-        if re.search(mark, head):
-            raise InputError(f"this is {name}, not a program; {remedy}", source=source)
-
-
 def is_plotter_file(data: bytes, source: str) -> bool:
     """True if a text is HPGL: by its content where that is clear, else by the suffix of its name."""
-    head = data[:_LOOKED_AT]
+    head = data[:LOOKED_AT]
     if _HPGL.match(head):
         return not _MACRO.match(head)
     return source.lower().endswith(PLOTTER_SUFFIXES) and not _NC.match(head)
@@ -169,12 +134,12 @@ def is_plotter_file(data: bytes, source: str) -> bool:
 
 def is_cl_file(data: bytes) -> bool:
     """True if a text is a CL file (APT)."""
-    return _CL_FILE.search(data[:_LOOKED_AT]) is not None
+    return _CL_FILE.search(data[:LOOKED_AT]) is not None
 
 
 def language_of(data: bytes) -> str | None:
     """`HEIDENHAIN` for conversational programs; None for all others."""
-    return HEIDENHAIN if _CONVERSATIONAL.search(data[:_LOOKED_AT]) else None
+    return HEIDENHAIN if _CONVERSATIONAL.search(data[:LOOKED_AT]) else None
 
 
 def siemens_mark(words: Words, source: str) -> str:
@@ -208,7 +173,7 @@ def without_leader(data: bytes, reading: Reading) -> tuple[bytes, str]:
         data = _JSON.sub(
             lambda found: found[1].rjust(found.end(1) - found.start()).ljust(len(found[0])), data
         )
-    match = _FIRST_PERCENT.search(data[:_LOOKED_AT])
+    match = _FIRST_PERCENT.search(data[:LOOKED_AT])
     text = data[: match.start()] if match else b""
     if not text.strip() or _LANGUAGE.search(text) or not _is_text(text):
         return data, ""
@@ -290,6 +255,9 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
         return False
     if machine is not None and machine.dialect is not None and machine.dialect.lathe is not None:
         return machine.dialect.lathe
+    polar = (112.0, 113.0)  # of Haas' lathes; of mills they are work systems among others
+    if all(len(words.find("G", code)) for code in polar) and not len(words.find("G", 110.0, 111.0, 114.0)):
+        return True
     if _has(words, "Y") or _has(words, "V"):
         return False
     letters = {chr(c) for c in np.unique(words.letter) if c}

@@ -89,7 +89,7 @@ class _Files:
         first, begin = self.rows.add_file(words, name)
         source = Source(words, len(self.sources), first, begin, self.integers)
         interpreter = self.run.interpreter
-        source.at_tip = interpreter.ignored.at_tip
+        source.at_tip, source.skips = interpreter.ignored.at_tip, interpreter.reading.block_delete
         if interpreter.machine is not None and interpreter.machine.dialect is not None:
             source.harmless = frozenset(map(str.upper, interpreter.machine.dialect.subprograms))
         self.sources.append(source)

@@ -43,10 +43,11 @@ class Source:
     """One file: its words, and the lines among them that may belong to the language.
 
     at_tip   : the machine has kinematics: words that switch the tool centre point are read
+    skips    : lines that start with "/" are left out
     harmless : subprograms of the machine's builder that move nothing, as the machine file says
     """
 
-    at_tip = False
+    at_tip = skips = False
     harmless: frozenset[str] = frozenset()
 
     def __init__(self, words: Words, file: int, first_row: int, begin: int, integers: Integers):

@@ -48,11 +48,19 @@ _TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
 _LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
 
 
+def condition_of(reader: LineReader) -> tree.Expression:
+    """[a] of IF and WHILE, or [a] AND [b] OR [c], from left to right. Raises ProgramFault."""
+    condition = reader.bracket()
+    while found := next((name for name in ("AND", "OR", "XOR") if reader.take(name)), ""):
+        condition = tree.op(found, condition, reader.bracket())
+    return condition
+
+
 class FanucControl(LineParser):
     """The statements so far, and the loops that are open, by their DO numbers."""
 
     def _while(self, reader: LineReader, line: SourceLine) -> None:
-        condition = reader.bracket()
+        condition = condition_of(reader)
         if not reader.take("DO"):
             raise reader.fault("WHILE [condition] is followed by DO and a number")
         self._do(reader, line, condition)

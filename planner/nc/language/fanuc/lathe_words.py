@@ -25,7 +25,8 @@ _TURNING = {"G84": 3.0, "G184": 4.0}  # the spindle, which these cycles start th
 # Codes that are not read, and what they are.
 _LIVE = "turns or drills with a driven tool, for which the spindle is an axis,"
 REFUSED = {
-    **dict.fromkeys(("G12.1", "G112", "G7.1", "G107"), "milling in x and the spindle's angle, which is no axis here,"),
+    **dict.fromkeys(("G12.1", "G112", "G7.1", "G107"),
+                    "milling in x and the spindle's angle, which is no axis here (a mill has [dialect] lathe = false),"),
     **dict.fromkeys(("G87", "G88"), "a cycle that drills from the side (Fanuc), or ends in a retract by hand (Haas),"),
     **dict.fromkeys(("G95", "G186", "G195", "G196", *(f"G{n}" for n in range(241, 250))), f"a cycle that {_LIVE}"),
     **dict.fromkeys(("G68", "G51.2", "G14", "G68.1"), "a second turret or spindle, or a part turned as a polygon,"),
@@ -80,6 +81,9 @@ class LatheWords(FanucParser):
                 f"{code}, {REFUSED[code]} is not read; write the moves out in X and Z, or leave this part out"
             )
         given = {word.letter: word.value for word in words if word.letter not in "GM"}
+        if "G33" in codes and "K" not in given:  # of systems B and C, with its lead as F
+            codes = {code.replace("G33", "G32") for code in codes}
+            words = tuple(w._replace(value=tree.Number(32.0)) if w.code == "G33" else w for w in words)
         self.feed = given.get("F", self.feed)
         if self._single(words, codes, line) or self._drilling(words, codes, line):
             return

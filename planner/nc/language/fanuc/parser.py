@@ -145,7 +145,7 @@ class FanucParser(FanucControl):
         reader.nothing_left(keyword)
 
     def _if(self, reader: LineReader, line: SourceLine) -> None:
-        condition = reader.bracket()
+        condition = calls.condition_of(reader)
         if reader.take("GOTO"):
             body: list[tree.Statement] = [tree.Goto(line.place, reader.value())]
         elif reader.take("THEN"):

@@ -46,7 +46,7 @@ class HeidenhainParser(Definitions):
 
     def parse(self) -> list[tree.Procedure]:
         """The main program under the empty name, and the subprograms that are called, under their labels."""
-        self.blocks = tuple(text.blocks(self.source.words.data, self.source.file, self.source.begin))
+        self.blocks = tuple(text.blocks(self.source))
         self._find_labels()
         self.compensates = any(moves.COMPENSATES.search(block.text) for block in self.blocks)
         self.oversizes = any(re.match(r"TOOL CALL.*\bDR", b.text, re.IGNORECASE) for b in self.blocks)

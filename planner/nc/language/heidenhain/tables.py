@@ -35,15 +35,15 @@ _CONTOURS = "it mills a contour of subprograms by paths that only the control kn
 _MEASURES = "it measures: only the machine knows where it ends"
 REFUSED_CYCLES = {
     **dict.fromkeys((2, 17, 18), "it taps by the data of older controls; write cycle 206 or 207"),
-    **dict.fromkeys((3, 4, 5), "it mills by the data of older controls; write cycle 251, 252 or 253"),
+    **dict.fromkeys((3, 4, 5, *range(210, 216)), "it mills by older data; write cycle 251, 252 or 253"),
     **dict.fromkeys((6, 14, 15, 16, *range(20, 26), 27, 28, 29, 39, *range(270, 277)), _CONTOURS),
     **dict.fromkeys(
-        (30, 230, 231, 232, 233, 256, 257, 258, *range(262, 268)),
+        (30, 225, *range(230, 237), 256, 257, 258, *range(262, 268), 285, 286, 287),
         "it mills by paths that only the control knows",
     ),
     **dict.fromkeys(
         (204, 241), "it bores or drills with spindle and coolant that the control switches on the way"
     ),
-    **dict.fromkeys((0, *range(400, 500)), _MEASURES),
-    **dict.fromkeys(range(800, 900), "it turns: contours of the part are the control's"),
+    **dict.fromkeys((0, 238, 239, *range(400, 500)), _MEASURES),
+    **dict.fromkeys((290, 291, 292, *range(800, 900)), "it turns: contours of the part are the control's"),
 }

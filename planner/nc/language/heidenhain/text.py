@@ -16,6 +16,7 @@ from functools import cache
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
+from planner.nc.language.source import Source
 from planner.nc.language.system_variables import FIRST_POSITION, PositionVariables, position
 from planner.nc.language.tokens import Token, TokenReader, names, ranked
 from planner.nc.language.tree import Expression
@@ -132,21 +133,24 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(pattern, re.IGNORECASE)
 
 
-def blocks(data: bytes, file: int, begin: int) -> Iterator[Block]:
-    """The blocks of a program.
-
-    file, begin : its number among the files, and where its bytes begin in the words' data
-    """
+def blocks(source: Source) -> Iterator[Block]:
+    """The blocks of a program, but for those that begin with / where such are left out."""
     waiting: tuple[tree.SourcePlace, str, list[tuple[int, int]]] | None = None
-    open_end = False
-    at = 0
-    for number, raw in enumerate(data.split(b"\n"), start=1):
+    open_end = hidden = False
+    at, file = source.begin, source.file
+    for number, raw in enumerate(source.words.data.split(b"\n"), start=1):
         text = raw.decode("latin-1")
-        start = begin + at
+        start = at
         at += len(raw) + 1
         body = text.split(";", 1)[0].rstrip()
         numbered = _NUMBERED.match(body)
         first = numbered.end() if numbered else len(body) - len(body.lstrip())
+        hidden = hidden or body[first : first + 1] == "/"
+        if hidden and source.skips:
+            hidden = body.endswith("~")
+            continue
+        if hidden:
+            first, hidden = len(body) - len(body[first + 1 :].lstrip()), False
         content = "" if body.strip().isdigit() else body[first:]  # a number alone stands before a comment
         ends_open = content.endswith("~")
         content = content.rstrip("~ \t\r\x1a")

@@ -197,7 +197,8 @@ class BlockWords(Places):
             name[1:] if letter in ("S", "M", "H", "T", "D") and name != letter and number is None else ""
         )
         if len(letter) != 1 or letter not in _WORDS or (number is None and reader.peek() != "="):
-            raise reader.fault(f"{name}: {tables.UNKNOWN.format(name)}", at - reader.start)
+            unknown = tables.OF_CONTROL if name[:1] == "$" else tables.UNKNOWN
+            raise reader.fault(f"{name}: {unknown.format(name)}", at - reader.start)
         given = tree.Number(number) if number is not None else self._given(reader, letter, at)
         if letter == "D":
             self.body.append(assumed_row(reader.place, "tool offset"))

@@ -40,7 +40,7 @@ IDLE = frozenset((
     "ICYCON", "DELAYFSTON", "DELAYFSTOF", "CPRECON", "CPRECOF", "FENDNORM", "SPCON", "SPCOF", "TANGOF",
     "COUPOF", "PTPOFF", "CP", "PM", "GETSELT", "DEACTPROC", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND",
     "CLEARM", "SETM", "LOCK", "UNLOCK", "CANCEL", "TCOABS", "TCOFR", "LFOF", "LFON", "PROTOCOL",
-    "INICF", "REDEF",
+    "INICF", "REDEF", "DYNNORM", "DYNPOS", "DYNROUGH", "DYNSEMIFIN", "DYNFINISH", "DYNPREC",
 ))  # fmt: skip
 # Commands and words that are not followed and may change geometry or time: what is said of them (making.py).
 SAID = {
@@ -103,6 +103,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     "PCALL": ("a program is called by a path of the control", 'write CALL "NAME", and put the file beside the program'),
     "PUTFTOC": ("it changes tool offsets while the axes move", "leave it out"),
 }  # fmt: skip
+OF_CONTROL = "a variable that only the control knows is not set; leave it out, or write what it does as words"
 UNKNOWN = (
     "there is no such subprogram in this program or its folder, and no such word is known: it may move the machine; put its file "
     "({0}.SPF or {0}.MPF) beside the program; if the machine's builder made it and it moves nothing, name it under [dialect] of "

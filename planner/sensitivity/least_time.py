@@ -1,7 +1,7 @@
 """A time that no motion within the limits of the axes, the feed and the tolerance falls short of.
 
 A motion passes the waypoints P_k of the path (vertices, and points on arcs and curves) in order, each within its
-tolerance e_k at a time t_k, and from t_k to t_{k+1} no faster than F_k and within the tolerance of leg k. Five facts:
+tolerance e_k at a time t_k, and from t_k to t_{k+1} no faster than F_k and within the tolerance of leg k. Six facts:
 
 **Feed.** For any vectors y_k whose product with a velocity that leg k allows is at most 1,
 
@@ -22,13 +22,16 @@ motion around their corners are points of a linear programme, whose least time i
 
 **Ends.** From rest, the first legs are taken as one straight way in whatever direction counts most; the last ones too.
 
+**Bends.** To be so far off a chord between two waypoints takes an acceleration, and so a time (bends.py).
+
 **Turning back.** Between a maximum of n.q and the next minimum, for any direction n, n.v is 0 at both and the way is
 n.(P_a - P_b) - 2 e at least. Such parts, from one extreme to a later one, stand for all legs between the vertices beside
 them where that is more.
 
 What is added belongs to parts of the motion that have no time in common; the best division is found from the start to
-the end. A part that turns back may begin within lines or an end, and then only what is known up to there counts: the legs at
-their feed, or a shorter end. All limits but those of axes, feed and tolerance are left out, so the bound holds with them too.
+the end. Where legs end, and a part begins, e |y| is lost of what they add, and where they begin again. Lines by samples count
+where the legs beside them go on, as their programme has y of these. All limits but those of axes, feed and tolerance are left
+out, so the bound holds with them too.
 """
 
 import numpy as np
@@ -36,10 +39,11 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
+from planner.sensitivity.bends import Chains, best_division
 from planner.sensitivity.corner_speeds import legs_between
 from planner.sensitivity.sampled_lines import chain_times, chains_of, sampled_legs
 from planner.sensitivity.straight_time import TINY, Bounds, End, straight_time
-from planner.sensitivity.turning_back import Turns, turns_of
+from planner.sensitivity.turning_back import Turns, events_of, turns_of
 from planner.sensitivity.waypoints import Way, way_of
 
 ROUNDING = 2e-6  # by how much limits may be exceeded by a motion that passes [-]
@@ -63,17 +67,13 @@ def least_time(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...
     more = _beside_feed(way, bounds, (direction * np.diff(way.point, axis=0)).sum(axis=1), by_axis)
     stops = np.flatnonzero(way.stop)
     of_run, y, leg = _best_of_runs(way, y, more, stops[:-1])
-    chains, gain = _chains(way, y, leg)
+    chains = _chains(way, y, leg)
     longest = np.argsort(-of_run)[:RUNS]
     for k in longest[np.diff(stops)[longest] > 1]:
         begin, end = stops[k], stops[k + 1]
-        run = way.part(begin, end)
-        turns = turns_of(run)
-        mine = (chains[:, 0] >= begin) & (chains[:, 1] <= end)
-        for whole in ((chains[:0], gain[:0]), (chains[mine] - begin, gain[mine])):
-            of_run[k] = max(
-                of_run[k], _with_turns(run, turns, *_with_ends(run, y[begin:end], leg[begin:end], *whole))
-            )
+        run, mine = way.part(begin, end), (chains.begin >= begin) & (chains.end <= end)
+        inside = Chains(chains.begin[mine] - begin, chains.end[mine] - begin, chains.gain[mine])
+        of_run[k] = max(of_run[k], _with_parts(run, turns_of(run), y[begin:end], leg[begin:end], inside))
     return float(of_run.sum() * (1.0 - ROUNDING) + toolpath.dwell.sum())
 
 
@@ -127,99 +127,48 @@ def _beside_feed(way: Way, bounds: Bounds, length: FloatArray, by_axis: Array) -
     return np.where(way.line, legs.time - legs.way / bounds.speed, 0.0)
 
 
-def _chains(way: Way, y: FloatArray, leg: FloatArray) -> tuple[Array, FloatArray]:
-    """(P, 2) first line of lines one after the other and the leg behind the last one, and what they take longer than with y
-    and what legs add [s], where they do."""
+def _chains(way: Way, y: FloatArray, leg: FloatArray) -> Chains:
+    """Lines one after the other, and what they take longer than with y and what legs add."""
     sampled = sampled_legs(way)
     found = chains_of(way, sampled)
-    if not len(found):
-        return found, np.zeros(0)
     begin, end = found.T
+    if not len(found):
+        return Chains(begin, end, np.zeros(0))
     jumps = np.concatenate([[0.0], _jumps(way, y), [0.0]])
     sums, jumped = np.append(0.0, np.cumsum(leg)), np.append(0.0, np.cumsum(jumps))
     before = sums[end] - sums[begin] - (jumped[end + 1] - jumped[begin])
-    gain = chain_times(way, sampled, found, y) - before
-    return found[gain > 0.0], gain[gain > 0.0]
+    return Chains(begin, end, chain_times(way, sampled, found, y) - before)
 
 
-def _with_ends(
-    run: Way, y: FloatArray, leg: FloatArray, chains: Array, gain: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """y and what each leg adds, where chains gain so much, and the first legs of a run and the last ones before or behind
-    them are taken as one straight way if that is more; and (2, N+1) how much less is known up to a waypoint within what is
-    one, and behind it."""
-    y, leg, less = y.copy(), leg.copy(), np.zeros((2, len(leg) + 1))
-    for (begin, end), more in zip(chains, gain, strict=True):
-        leg[begin] += more
-        less[0, begin + 1 : end] = more
-    count = len(leg)
-    # y of the legs beside a chain stay
-    head = max(chains[0, 0] - 1, 0) if len(chains) else count
-    first, spare = _from_rest(run, y, leg, head)
-    less[0, 1:first] = spare
-    tail = max(count - chains[-1, 1] - 1, 0) if len(chains) else count - first
-    y, leg = -y[::-1], leg[::-1].copy()
-    last, spare = _from_rest(run.backwards(), y, leg, tail)
-    less[1, count - last + 1 : count] = spare[::-1]
-    return -y[::-1], leg[::-1], less
-
-
-def _from_rest(run: Way, y: FloatArray, leg: FloatArray, most: int) -> tuple[int, FloatArray]:
-    """Put the first legs of a run, at most so many, as one straight way into y and `leg`; returns how many, and how much
-    less of it is known up to each waypoint within them, by the best shorter way [s]."""
-    count = len(leg)
-    if most < 1:
-        return 0, np.zeros(0)
-    m = np.unique(np.geomspace(1, most, HEADS).astype(int))
-    way = run.point[m] - run.point[0]
+def _from_rest(run: Way, behind: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(N+1,) the least time of a straight way from rest to waypoints; and the same where the legs behind, of y `behind` (N+1, A),
+    go on from there with what it has for y, which costs less than to begin anew [s]. -inf where it is not looked at."""
+    alone, joined = np.full((2, len(behind)), -np.inf)
+    m = np.unique(np.geomspace(1, len(behind) - 1, HEADS).astype(int))
+    way, within = run.point[m] - run.point[0], run.tolerance[m]
     size = np.linalg.norm(way, axis=1)
-    all_of_it, rests = m == count, run.stop[m]
-    bounds, heads = run.along(way / np.maximum(size, TINY)[:, None], np.maximum.accumulate(run.feed)[m - 1])
-    least = np.maximum(size - run.tolerance[m], 0.0)
+    feed = np.maximum.accumulate(run.feed)[m - 1]
+    bounds, y = run.along(way / np.maximum(size, TINY)[:, None], feed)
     begin = End(np.zeros(len(m)), np.ones(len(m), dtype=bool))
-    end = End(np.where(rests, 0.0, bounds.speed), rests)
-    longer = straight_time(least, begin, end, bounds) - least / bounds.speed
-    after = np.where(all_of_it[:, None], 0.0, y[np.minimum(m, count - 1)])
-    jumps = np.append(_jumps(run, y), 0.0)
-    gain = (heads * way).sum(axis=1) + longer - run.tolerance[m] * np.linalg.norm(after - heads, axis=1)
-    gain -= np.cumsum(leg - jumps)[m - 1]
-    best = int(gain.argmax())
-    if gain[best] <= 0.0:
-        return 0, np.zeros(0)
-    first = int(m[best])
-    within = run.tolerance[1:first]
-    shorter = np.zeros(first)  # at each waypoint, what ends before it are worth
-    shorter[m[:best]] = np.maximum(gain[:best], 0.0)
-    known = np.maximum.accumulate(shorter)[:-1] + np.cumsum(leg - jumps)[: first - 1] + jumps[: first - 1]
-    known -= within * np.linalg.norm(y[: first - 1], axis=1)
-    y[:first] = heads[best]
-    leg[:first] = (heads[best] * np.diff(run.point[: first + 1], axis=0)).sum(axis=1)
-    leg[0] += longer[best]
-    return first, np.cumsum(leg)[: first - 1] - within * np.linalg.norm(heads[best]) - known
+    end = End(np.where(run.stop[m], 0.0, bounds.speed), run.stop[m])
+    least = np.maximum(size - within, 0.0)
+    alone[m] = straight_time(least, begin, end, bounds)
+    of_y, of_behind, change = (np.linalg.norm(one, axis=1) for one in (y, behind[m], behind[m] - y))
+    joined[m] = alone[m] + (size - least) * of_y + within * (of_behind - change)
+    return alone, joined
 
 
-def _with_turns(run: Way, turns: list[Turns], y: FloatArray, leg: FloatArray, less: FloatArray) -> float:
-    """The bound of a run: its legs, or parts that turn back where these take longer.
+def _with_parts(run: Way, turns: list[Turns], y: FloatArray, leg: FloatArray, chains: Chains) -> float:
+    """The bound of a run: its legs and chains, or parts from and to rest, or that bend or turn back, where these take longer.
 
     Up to waypoint k the legs take total[k], with what y jumps by there. They may end there and a part begin, or begin
-    there behind a part; then y ends or begins at 0, and so much less (2, N+1) is known of what is before or behind.
-    `gain` is what parts up to where the scan is have been worth.
+    there behind a part; then y ends or begins at 0.
     """
-    size, within = np.linalg.norm(y, axis=1), run.tolerance
-    jump = np.concatenate([[0.0], _jumps(run, y), [0.0]])
+    within, size = run.tolerance, np.linalg.norm(y, axis=1)
+    jump, rest = np.concatenate([[0.0], _jumps(run, y), [0.0]]), 0.0 * y[:1]
     total = np.append(0.0, np.cumsum(leg)) - np.cumsum(jump)
-    ended = total + jump - within * np.append(0.0, size) - less[0]
-    begun = total + within * np.append(size, 0.0) + less[1]
-    reached = [np.zeros(len(one.begin)) for one in turns]  # the best up to each extreme
-    events = [(int(k), 1, d, n) for d, one in enumerate(turns) for n, k in enumerate(one.begin) if n]
-    events += [
-        (int(k), 0, d, n) for d, one in enumerate(turns) for n, k in enumerate(one.end) if n and k >= 0
-    ]
-    gain = 0.0
-    for k, begins, d, n in sorted(events):
-        if begins:
-            entered = ended[k] + gain if turns[d].stands_out[n] else 0.0
-            reached[d][n] = max(reached[d][n - 1] + turns[d].time[n - 1], entered)
-        else:
-            gain = max(gain, reached[d][n] - begun[k])
-    return float(total[-1] + gain)
+    ended = total + jump - within * np.append(0.0, size)
+    from_rest = _from_rest(run, np.vstack([y, rest]))
+    to_rest = [one[::-1] for one in _from_rest(run.backwards(), np.vstack([-y[::-1], rest]))]
+    known = np.stack([total, ended, within * np.append(size, 0.0), *from_rest, *to_rest])
+    return float(best_division(run.point, within, run.limit[1], known, chains, events_of(turns)))

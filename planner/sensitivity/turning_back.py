@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.sensitivity.bends import Events
 from planner.sensitivity.straight_time import End, straight_time
 from planner.sensitivity.waypoints import Way
 
@@ -39,6 +40,28 @@ def turns_of(run: Way) -> list[Turns]:
         if len(at) > 2:
             found.append(_between(run, direction, place, at))
     return found
+
+
+def events_of(turns: list[Turns]) -> Events:
+    """Where parts between extremes may begin and end, for all directions."""
+    first = np.cumsum([0, *(len(one.begin) for one in turns)])
+    begins = [
+        (int(k), 1, first[d] + n, one.stands_out[n])
+        for d, one in enumerate(turns)
+        for n, k in enumerate(one.begin)
+        if n
+    ]
+    ends = [
+        (int(k), 0, first[d] + n, False)
+        for d, one in enumerate(turns)
+        for n, k in enumerate(one.end)
+        if n and k >= 0
+    ]
+    waypoint, begin, extreme, stands_out = (
+        np.array(sorted(begins + ends), dtype=np.int64).reshape(-1, 4).T.copy()
+    )
+    time = np.concatenate([np.zeros(0), *(np.append(one.time, 0.0) for one in turns)])
+    return Events(waypoint, begin, extreme, stands_out, time)
 
 
 def _between(run: Way, direction: FloatArray, place: FloatArray, at: Array) -> Turns:

@@ -1,1 +1,16 @@
-"""What planning takes: time and memory."""
+"""What plans cost: computing time, memory, installation.
+
+What was tried to make them cheaper and brought nothing, so that it is not tried again in the same way:
+
+    the search     multipliers of the search in long steps handed on to the second one, other first slacks, starts nearer to
+                   the optimum: fewer iterations on reliefs, none fewer or more on random jobs, since other rows hold
+                   the motion there; durations frozen as soon as the kinematics nearly hold: more iterations
+    windows        of 500 steps for short runs too, or overlapping by half as much: slower motions; all in lanes however few
+                   lanes are filled: arcs take longer
+    first motion   on a coarser grid: cheaper on long programs of short blocks, dearer on random ones, some motions slower
+    the verdict    fewer looks between setpoints where the acceleration is small: distances from vertices are those of
+                   chords between looks, right motions were refused; the worst of each quantity found by a kernel of its
+                   own: numpy's division and argmax are as fast; motions of long runs evaluated together: what they take
+                   is arithmetic, not calls (of short runs it is calls: planner/joint/splice.py)
+    kernels        in numba's own cache, in three ways: results/first-run.md
+"""

@@ -67,7 +67,7 @@ def _of_limits(keeps, r, h, v, a, j):
         square, _, across = _at(v, a, j, t)
         if square > best:
             best, at = square, t
-        if square > 0.0 and across > 0.0:
+        if square > 0.0 and across > square * (worst * keeps.normal[r]) ** 2:  # spares most places the root
             worst = max(worst, np.sqrt(across / square) / keeps.normal[r])
     for _ in range(NEWTON_STEPS):
         _, along, _ = _at(v, a, j, at)

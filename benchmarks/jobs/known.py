@@ -13,7 +13,8 @@ The tolerance lets a motion leave the path, so what is fastest on the path need 
                   tolerance, which is less than `SHIFTED` of the way.
     stopping      the same under G61.1: a full stop between. By ruckig.
     turns         full circles that the feed holds. From one circle to three the time grows by two circles at the inner edge of the
-                  tolerance, where the chords between setpoints touch it, at the feed.
+                  tolerance, where the chords between setpoints touch it, at the feed. Where setpoints would be beyond the outer
+                  edge then, chords from edge to edge turn by the most that a period can.
 """
 
 from __future__ import annotations
@@ -116,9 +117,11 @@ def turns(random: np.random.Generator) -> Known:
     acceleration = feed * rate * 10 ** random.uniform(0.2, 1.0)
     jerk = max(2.0 * feed * rate**2, acceleration / 0.05)
     machine = _machine(random, np.full(3, acceleration), np.full(3, jerk), np.full(3, FAST), tolerance)
-    inner = (radius - tolerance) / np.cos(0.5 * machine.dt * feed / (radius - tolerance))
+    inner, outer = radius - tolerance, radius + tolerance
+    setpoints = inner / np.cos(0.5 * machine.dt * feed / inner)
+    turning = feed / setpoints if setpoints <= outer else 2.0 / machine.dt * np.arccos(inner / outer)
     one, three = (_program(f"G64 F{60 * feed:.9g}", [f"G2 X0 Y0 I{radius} J0"] * n) for n in (1, 3))
-    return Known(three, machine, 2.0 * 2.0 * np.pi * inner / feed, less=one)
+    return Known(three, machine, 2.0 * 2.0 * np.pi / turning, less=one)
 
 
 SORTS: tuple[tuple[Callable[[np.random.Generator], Known], int], ...] = (

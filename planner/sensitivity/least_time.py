@@ -43,7 +43,7 @@ from planner.sensitivity.bends import Chains, best_division
 from planner.sensitivity.corner_speeds import legs_between
 from planner.sensitivity.sampled_lines import chain_times, chains_of, sampled_legs
 from planner.sensitivity.straight_time import TINY, Bounds, End, straight_time
-from planner.sensitivity.turning_back import Turns, events_of, turns_of
+from planner.sensitivity.turning_back import turns_of
 from planner.sensitivity.waypoints import Way, way_of
 
 ROUNDING = 2e-6  # by how much limits may be exceeded by a motion that passes [-]
@@ -73,7 +73,7 @@ def least_time(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...
         begin, end = stops[k], stops[k + 1]
         run, mine = way.part(begin, end), (chains.begin >= begin) & (chains.end <= end)
         inside = Chains(chains.begin[mine] - begin, chains.end[mine] - begin, chains.gain[mine])
-        of_run[k] = max(of_run[k], _with_parts(run, turns_of(run), y[begin:end], leg[begin:end], inside))
+        of_run[k] = max(of_run[k], _with_parts(run, y[begin:end], leg[begin:end], inside))
     return float(of_run.sum() * (1.0 - ROUNDING) + toolpath.dwell.sum())
 
 
@@ -158,7 +158,7 @@ def _from_rest(run: Way, behind: FloatArray) -> tuple[FloatArray, FloatArray]:
     return alone, joined
 
 
-def _with_parts(run: Way, turns: list[Turns], y: FloatArray, leg: FloatArray, chains: Chains) -> float:
+def _with_parts(run: Way, y: FloatArray, leg: FloatArray, chains: Chains) -> float:
     """The bound of a run: its legs and chains, or parts from and to rest, or that bend or turn back, where these take longer.
 
     Up to waypoint k the legs take total[k], with what y jumps by there. They may end there and a part begin, or begin
@@ -171,4 +171,4 @@ def _with_parts(run: Way, turns: list[Turns], y: FloatArray, leg: FloatArray, ch
     from_rest = _from_rest(run, np.vstack([y, rest]))
     to_rest = [one[::-1] for one in _from_rest(run.backwards(), np.vstack([-y[::-1], rest]))]
     known = np.stack([total, ended, within * np.append(size, 0.0), *from_rest, *to_rest])
-    return float(best_division(run.point, within, run.limit[1], known, chains, events_of(turns)))
+    return float(best_division(run.point, within, run.limit[1], known, chains, turns_of(run)))

@@ -198,7 +198,7 @@ def ends_at_corners(
     middle += np.stack([-1.0 / h, 1.0 / h, 0.0 * h], axis=1)
     variables = np.stack([at.back[behind - 1, 0], at.waypoint[inner], at.front[behind, 0]], axis=1)
     variables = variables[..., None] + np.arange(axes)
-    reach = _reach(lines, at)
+    free = rows.programme(np.zeros(n), np.zeros(n), _reach(lines, at))
     along, bounds = coordinate
     ends = []
     for line, end in ((behind - 1, legs.end), (behind, legs.begin)):
@@ -206,7 +206,7 @@ def ends_at_corners(
         unit, direction = end.speed[line], along[line]  # what is known, as a unit
         cost = np.zeros(n)
         cost[variables] = -middle[..., None] * (direction / unit[:, None])[:, None]
-        programme = rows.programme(cost, np.zeros(n), reach)
+        programme = free._replace(cost=cost)
         z = multipliers(programme, float(len(line)), NEAR * len(line), ITERATIONS)
         found = -bounds_by_part(programme, z, window)[window[at.waypoint[inner]]] * unit
         found += np.abs(direction) @ way.limit[2] * h * h_behind / 6.0

@@ -1,7 +1,5 @@
 """Parts of a motion between extremes in a direction, where it turns back (least_time.py)."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
@@ -10,24 +8,11 @@ from planner.sensitivity.straight_time import End, straight_time
 from planner.sensitivity.waypoints import Way
 
 
-class Turns(NamedTuple):
-    """The K extremes of a run in one direction, of which the first and the last are its start and end.
-
-    time       : (K-1,) from each to the next [s]
-    begin      : (K,) the last waypoint before each from which it stands out, if it does; else the extreme before
-    stands_out : (K,)
-    end        : (K,) the first waypoint behind each from which it stands out; -1 where there is none
-    """
-
-    time: FloatArray
-    begin: Array
-    stands_out: Array
-    end: Array
-
-
-def turns_of(run: Way) -> list[Turns]:
-    """The extremes in the directions of the axes and of their diagonals."""
-    found, axes = [], run.point.shape[1]
+def turns_of(run: Way) -> Events:
+    """Where parts between extremes in the directions of the axes and of their diagonals may begin and end; the first extreme and
+    the last are the start and the end of the run."""
+    events: list[tuple[int, bool, int, bool]] = []
+    times, first, axes = [np.zeros(0)], 0, run.point.shape[1]
     width = 2.0 * float(run.tolerance.max())
     for signs in np.ndindex(*(3,) * axes):
         direction = np.array(signs) - 1.0
@@ -38,34 +23,22 @@ def turns_of(run: Way) -> list[Turns]:
         place = run.point @ direction
         at = extremes(place, width)
         if len(at) > 2:
-            found.append(_between(run, direction, place, at))
-    return found
+            time, begin, stands_out, end = _between(run, direction, place, at)
+            for n in range(1, len(at)):
+                events.append((int(begin[n]), True, first + n, bool(stands_out[n])))
+                if end[n] >= 0:
+                    events.append((int(end[n]), False, first + n, False))
+            times.append(np.append(time, 0.0))
+            first += len(at)
+    waypoint, begins, extreme, out = np.array(sorted(events), dtype=np.int64).reshape(-1, 4).T.copy()
+    return Events(waypoint, begins, extreme, out, np.concatenate(times))
 
 
-def events_of(turns: list[Turns]) -> Events:
-    """Where parts between extremes may begin and end, for all directions."""
-    first = np.cumsum([0, *(len(one.begin) for one in turns)])
-    begins = [
-        (int(k), 1, first[d] + n, one.stands_out[n])
-        for d, one in enumerate(turns)
-        for n, k in enumerate(one.begin)
-        if n
-    ]
-    ends = [
-        (int(k), 0, first[d] + n, False)
-        for d, one in enumerate(turns)
-        for n, k in enumerate(one.end)
-        if n and k >= 0
-    ]
-    waypoint, begin, extreme, stands_out = (
-        np.array(sorted(begins + ends), dtype=np.int64).reshape(-1, 4).T.copy()
-    )
-    time = np.concatenate([np.zeros(0), *(np.append(one.time, 0.0) for one in turns)])
-    return Events(waypoint, begin, extreme, stands_out, time)
-
-
-def _between(run: Way, direction: FloatArray, place: FloatArray, at: Array) -> Turns:
-    """The parts between the extremes `at` (K,) of `place` (N+1,) in a direction."""
+def _between(
+    run: Way, direction: FloatArray, place: FloatArray, at: Array
+) -> tuple[FloatArray, Array, Array, Array]:
+    """Of the extremes `at` (K,) of `place` (N+1,) in a direction: (K-1,) the time from each to the next [s]; (K,) the last waypoint
+    before each from which it stands out, if it does, (K,), else the extreme before; and (K,) the first behind it, -1 for none."""
     width, last = 2.0 * float(run.tolerance.max()), len(place) - 1
     begin, end = np.append(0, at[:-1]), np.full(len(at), last)
     stands_out = np.zeros(len(at), dtype=bool)  # the start and the end do not
@@ -84,7 +57,7 @@ def _between(run: Way, direction: FloatArray, place: FloatArray, at: Array) -> T
     least = np.maximum(np.abs(np.diff(place[at])) - run.tolerance[at[:-1]] - run.tolerance[at[1:]], 0.0)
     still, rests = np.zeros(len(feed)), np.arange(len(feed))
     time = straight_time(least, End(still, rests == 0), End(still, rests == len(feed) - 1), bounds)
-    return Turns(time, begin, stands_out, end)
+    return time, begin, stands_out, end
 
 
 def extremes(place: FloatArray, width: float) -> Array:

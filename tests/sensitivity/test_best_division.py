@@ -12,7 +12,7 @@ from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.sensitivity.bends import SIZES, Chains, Events, bend_time, best_division
 
-NONE = Events(*(np.zeros(0, dtype=np.int64) for _ in range(3)), np.zeros(0, dtype=bool), np.zeros(0))
+NONE = Events(*(np.zeros(0, dtype=np.int64) for _ in range(4)), np.zeros(0))
 
 
 @pytest.mark.parametrize("seed", range(20))

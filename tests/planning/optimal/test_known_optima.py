@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("clarabel")
 pytest.importorskip("ruckig")
 
-from benchmarks.jobs.known import SORTS, job, to_a_point, turning_back
+from benchmarks.jobs.known import SORTS, job, to_a_point, turning_back, turns
 from benchmarks.judge.known_optima import above
 from benchmarks.solvers.one_axis import AGREE, fastest
 
@@ -27,6 +27,11 @@ def test_optimal_takes_the_time_that_is_known(sort, seed):
 def test_windows_that_ran_round_and_round_end(seed):
     """Steps that are shortened again and again for what they bend."""
     assert -KNOWN < above(job(turning_back, seed)) < WITHIN
+
+
+def test_a_circle_whose_chords_take_the_whole_tolerance_takes_about_the_time_that_is_known():
+    """Chords from the outer edge to the outer edge that touch the inner one; the search leaves 1.5 % of the tolerance."""
+    assert -KNOWN < above(job(turns, 210)) < 1e-2
 
 
 def test_one_part_from_rest_to_rest_takes_four_phases_of_jerk():

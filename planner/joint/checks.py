@@ -18,6 +18,8 @@ from planner.joint.legs import LegFormulas, along_tangent, formula_point, neares
 
 PLACES = 33  # where a step is looked at first [-]
 NEWTON_STEPS = 4  # from the highest of them: 1/32 of a step becomes exact to rounding [-]
+# Shares of a chord at which it is looked at beside a vertex [-].
+PASSED = (0.1, 0.2, 0.3, 0.4, 0.6, 0.7, 0.8, 0.9)
 # Of a step on an arc; what the arc is off its cubic goes with the fourth power of their length.
 PIECES = 4
 
@@ -185,45 +187,65 @@ def worst_shares(keeps, leg, h, state, jerk, place):
     """
     N, axes = jerk.shape
     limit, tube, x = 0.0, np.zeros((2, N)), np.empty((N + 1, 3 * axes))
+    mean, wider = chord_means(keeps, leg, h, state, jerk)
     for i in range(N):
         limit = max(limit, _of_limits(keeps, leg[i], h[i], state[i, 1], state[i, 2], jerk[i]))
     for seen in range(2):
-        x[:] = 0.0
         for i in range(N + 1):
-            x[i, 2 * axes :] = state[i, 2]
-            if not seen:
-                x[i, :axes] = state[i, 0]
-        for k in range(len(keeps.lag) * seen):
-            for side in (-1.0, 1.0):
-                _add_later(h, state, jerk, keeps.lag[k, 0] + side * keeps.chord, 0.5 * keeps.lag[k, 1], x)
+            x[i, :axes], x[i, 2 * axes :] = mean[i] if seen else state[i, 0], state[i, 2]
         for i in range(N):  # between nodes they are off the motion by a linear share
             for k in range(axes):
                 off = x[i + 1, k] - state[i + 1, 0, k] - (x[i, k] - state[i, 0, k])
                 x[i, axes + k] = state[i, 1, k] + off / h[i]
-        _put_tube(keeps, leg, h, x, place, tube[seen])
+        _put_tube(keeps, leg, h, x, place, seen * wider, tube[seen])
     return limit, tube
 
 
-@njit(cache=True, error_model="numpy")
-def _add_later(h, state, jerk, later, weight, x):
-    """Positions `later` [s] than the nodes, times a weight, are added to x (N+1, ..); beyond the steps there are, the
-    acceleration stays as at their end."""
-    N, axes, n = len(h), jerk.shape[1], 0
-    node = np.append(0.0, np.cumsum(h))
-    for i in range(N + 1):
-        at = node[i] + later
-        while n < N and node[n + 1] <= at:
-            n += 1
-        t = at - node[n]
-        for k in range(axes):
-            j = jerk[n, k] if n < N and t >= 0.0 else 0.0
-            p, v, a = state[n, 0, k], state[n, 1, k], state[n, 2, k]
-            x[i, k] += weight * (p + t * (v + t * (0.5 * a + t * j / 6.0)))
+@njit(cache=True, error_model="numpy", nogil=True)
+def chord_means(keeps, leg, h, state, jerk):
+    """(N+1, A) the middles of the chords, behind filters, that are there when the motion is at the nodes; (N+1,) by how much
+    chords that pass a vertex at another place than their middle are farther from it. Arguments as above."""
+    nodes, axes = len(state), jerk.shape[1]
+    point, tangent, bend, other = np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes)
+    node, mean, wider = np.append(0.0, np.cumsum(h)), np.zeros((nodes, axes)), np.zeros(nodes)
+    for i in range(nodes):
+        _add_chord(keeps, node, state, jerk, node[i], 0.5, mean[i])
+        if 0 < i < nodes - 1 and leg[i] != leg[i - 1] and keeps.chord > 0.0:
+            formula_point(keeps.legs, leg[i], 0.0, point, tangent, bend)
+            for side in PASSED:
+                other[:] = 0.0
+                _add_chord(keeps, node, state, jerk, node[i], side, other)
+                wider[i] = max(wider[i], _apart(other, point, tangent, 0.0))
+            wider[i] = max(wider[i] - _apart(mean[i], point, tangent, 0.0), 0.0)
+    return mean, wider
 
 
 @njit(cache=True, error_model="numpy")
-def _put_tube(keeps, leg, h, x, place, tube):
-    """Into `tube` (N,) the shares that steps use of the tolerance whose states at their beginnings are x (N+1, 3 A)."""
+def _add_chord(keeps, node, state, jerk, t, share, x):
+    """To x (A,) is added where on a chord, behind filters, its `share` is at time t; node (N+1,) times of the nodes."""
+    for k in range(len(keeps.lag)):
+        for end in range(2):
+            later = keeps.lag[k, 0] + 2.0 * keeps.chord * (end - share)
+            weight = keeps.lag[k, 1] * (share if end else 1.0 - share)
+            _add_later(node, state, jerk, t + later, weight, x)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_later(node, state, jerk, time, weight, x):
+    """The position at a time, times a weight, is added to x (A,); beyond the steps there are, the acceleration stays as at
+    their end."""
+    N = len(node) - 1
+    n = max(np.searchsorted(node, time, side="right") - 1, 0)
+    t = time - node[n]
+    for k in range(len(x)):
+        j = jerk[n, k] if n < N and t >= 0.0 else 0.0
+        x[k] += weight * (state[n, 0, k] + t * (state[n, 1, k] + t * (0.5 * state[n, 2, k] + t * j / 6.0)))
+
+
+@njit(cache=True, error_model="numpy")
+def _put_tube(keeps, leg, h, x, place, less, tube):
+    """Into `tube` (N,) the shares that steps use of the tolerance whose states at their beginnings are x (N+1, 3 A); it is
+    `less` (N+1,) at vertices."""
     N, axes, before = len(h), x.shape[1] // 3, 0.0
     c, budgets = np.empty((4, axes)), np.empty(2)
     work = (
@@ -241,11 +263,11 @@ def _put_tube(keeps, leg, h, x, place, tube):
             c[3, k] = x[i + 1, k]
         budgets[:] = keeps.budget[r]
         if begins:
-            before, budgets[0] = 0.0, min(budgets[0], keeps.vertex_budget[r])
+            before, budgets[0] = 0.0, min(budgets[0], keeps.vertex_budget[r]) - less[i]
         elif i == 0:
             before = nearest_point(keeps.legs, r, c[0], place[i, 0], work[0], work[1])
         if ends:
-            budgets[1] = min(budgets[1], keeps.vertex_budget[r + 1])
+            budgets[1] = min(budgets[1], keeps.vertex_budget[r + 1]) - less[i + 1]
         end = keeps.legs.length[r] if ends else max(place[i, 2], before)
         if keeps.passed[r]:
             end = place[i, 0] + 3.0 * (place[i, 1] - place[i, 0])

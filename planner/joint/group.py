@@ -56,6 +56,7 @@ class Group(NamedTuple):
     room: FloatArray  # (N, W)
     room_node: FloatArray  # (N, W)
     sag: FloatArray  # (2, W)
+    rest: FloatArray  # (N, 2, A, W)
     feed: FloatArray  # (N, W) the square of the limit
     feed_node: FloatArray  # (N, W)
     normal: FloatArray  # (N, W) the limit
@@ -141,6 +142,7 @@ def group_of(
         room=1.0 / limit("room", 1.0) ** 2,
         room_node=1.0 / limit("room_node", 1.0) ** 2,
         sag=stack([one.limits.sag for one in windows], 0.0, SETS),
+        rest=np.insert(limit("rest"), [of] * (axes - of), 0.0, axis=2),
         feed=limit("feed", 1.0) ** 2,
         feed_node=1.0 / limit("feed_node", 1.0) ** 2,
         normal=limit("normal", 1.0),

@@ -42,9 +42,12 @@ class Window(CutMotion):
     leg, h, state, place : as of that; of the steps beside it, which may be found meanwhile, only the legs are
                            read, and their h is 0
     lo, hi               : the steps of the window are lo .. hi - 1 of these
+    rest                 : (hi - lo + 1, A + 1) what chords are off at its nodes beside their sag (problem.py), and how much less
+                           room they have at vertices [mm]; None where nothing is known
     """
 
-    def __init__(self, cut: CutMotion | Guess, lo: int, hi: int):
+    def __init__(self, cut: CutMotion | Guess, lo: int, hi: int, rest: FloatArray | None = None):
+        self.rest = rest
         begin, end = max(lo - 1, 0), min(hi + 1, len(cut))
         self.leg, self.h = cut.leg[begin:end], cut.h[begin:end].copy()
         self.state, self.place = cut.state[begin : end + 1].copy(), cut.place[begin:end].copy()

@@ -11,7 +11,7 @@ from planner.joint.group import Group, Sizes
 from planner.joint.recursion import Room
 from planner.joint.row_kinds import NORMAL_ROWS, SETS, VECTORS, Rows, Scratch
 
-_ALL, THREE, PLACES = size(VECTORS), size(3), size(3 * SETS)
+_ALL, TWO, THREE, PLACES = size(VECTORS), size(2), size(3), size(3 * SETS)
 
 
 class Work(NamedTuple):
@@ -76,6 +76,7 @@ def lanes_of(sizes, group):
         wide1(group.room, width),
         wide1(group.room_node, width),
         wide1(group.sag, width),
+        wide3(group.rest, width, TWO, sizes.axes),
         wide1(group.feed, width),
         wide1(group.feed_node, width),
         wide1(group.normal, width),

@@ -18,10 +18,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.feedrate.solution import Status
-from planner.joint.checks import Keeps, worst_shares
+from planner.joint.checks import Keeps, chord_means, worst_shares
 from planner.joint.groups import Search, Sweep, Task, searched
 from planner.joint.guess import CutMotion, Guess, unit_of
 from planner.joint.interior_point import Tuning
@@ -33,7 +33,7 @@ from planner.joint.nlp import PULL
 from planner.joint.outcome import TubeSolution
 from planner.joint.own_laws import watched
 from planner.joint.price import columns, step_prices
-from planner.joint.problem import NARROWED, StepWindow, window_of
+from planner.joint.problem import NARROWED, SEEN, StepWindow, window_of
 from planner.joint.row_kinds import H_MIN
 from planner.joint.run import TubeRun
 from planner.joint.switches import Beside, no_rows_beside, switches_missed
@@ -54,10 +54,11 @@ JOIN_WITHIN = SIZES.searched_join
 PROX, MISSED = 0.1, 1e-6
 # Complementarity of the start, share of the time, and its slacks at least [-].
 START = (0.3, 0.05)
-# Laws of the position are about a place, of the tolerance along a curve the rows know the tangents at nodes, and of chords
-# the acceleration there. Where one is exceeded it is lowered by what it was above, and a little more [-]; the tolerance by
-# that power of it, as chords that are longer than steps then have more acceleration elsewhere.
-TIGHTER, MORE = 1.002, 2.0
+# Laws of the position are about a place, of the tolerance along a curve the rows know the tangents at nodes. Where one is
+# exceeded it is lowered by what it was above, and a little more [-]; the tolerance by that power of it. Of chords the rows
+# know the acceleration: where they leave the tolerance they are told what chords were off beside it, and the search goes on
+# from there with that pull, as that is of the durations found.
+TIGHTER, MORE, PULL_OF_CHORDS = 1.002, 2.0, 0.01
 # Where steps want to be shorter than they may become (problem.py) a window is searched once more from what was found,
 # if that is worth this share of the time [-]
 # (`python -m benchmarks.net.ablation ROWS --net NET --without SHORTENED`).
@@ -243,7 +244,9 @@ class _Search:
         needed, beside, taken = near(run.laws, begun), no_rows_beside(hi - lo, len(run.axis)), False
         for number in range(TOLD):
             which = np.flatnonzero(needed)
-            window = window_of(run, begun, begun.lo, begun.hi, MISSED, tight, smooth, which, beside)
+            window = window_of(
+                run, begun, begun.lo, begun.hi, MISSED, tight, smooth, which, beside, begun.rest
+            )
             done, iterations, z = yield Asked(window, tuning)
             self.iterations.append(iterations)
             if not done:
@@ -251,7 +254,7 @@ class _Search:
             over = self._taken(lo, hi, window, begun, beside, last=number == TOLD - 1)
             if over is None:
                 self.price[lo:hi] = step_prices(run, window, z)
-                taken, begun = True, Window(self.guess, lo, hi)
+                taken, begun = True, Window(self.guess, lo, hi, begun.rest)
                 shorter = z[:, 8 * len(run.axis) + H_MIN].sum()
                 if shorter <= SHORTENED * window.u[:, -1].sum():
                     break
@@ -260,7 +263,8 @@ class _Search:
                 continue
             if not (over > 1.0).any():
                 break
-            tuning = tuning._replace(pull=PULL_AGAIN if run.laws.moved else PULL)
+            of_chords = PULL if begun.rest is None else PULL_OF_CHORDS
+            tuning = tuning._replace(pull=PULL_AGAIN if run.laws.moved else of_chords)
             of_laws = over[:, 1:]
             # rows that are far off are asked for about other places first
             near_enough = (of_laws.max(axis=0, initial=0.0) < 1.0 + SLID) | (number > 0)
@@ -286,14 +290,17 @@ class _Search:
         place = window.place[:, :3] * window.length
         along = place + run.offset[leg][:, None]
         limit, (tube, chords) = worst_shares(self._keeps, leg, h, found, jerk, place)
-        if not last:
-            tube = np.maximum(tube, chords)
+        of_chords = not last and tube.max() <= 1.0 < chords.max()
+        if of_chords:  # what they are off beside their rows says by how much
+            tube = np.minimum(chords, 1.0 + ROUNDING)
         ends = np.append(along[:, 0], guess.place[hi - 1, 3])
         of_laws = watched(run.laws, leg, h, found, jerk, ends)
         inside = limit <= 1.0 + ROUNDING and of_laws.max(initial=0.0) <= 1.0 + ROUNDING
         if not (inside and tube.max() <= 1.0):
-            if run.laws.moved and tube.max() <= 1.0:
+            if of_chords or (run.laws.moved and tube.max() <= 1.0):
                 begun.put(h, found, along)
+            if of_chords:
+                begun.rest = self._rest(leg, h, found, jerk)
             # what passes a short leg at its distance is nearest to one of its ends, and too far in its middle:
             # no step of such a leg alone is the cause
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
@@ -309,6 +316,11 @@ class _Search:
             guess.h[lo:hi], guess.state[lo + 1 : hi], self.jerk[lo:hi] = h, found[1:-1], jerk
             self.kept[lo:hi] = False
         return None
+
+    def _rest(self, leg: Array, h: FloatArray, state: FloatArray, jerk: FloatArray) -> FloatArray:
+        """`Window.rest` of a motion."""
+        means, wider = chord_means(self._keeps, leg, h, state, jerk)
+        return np.column_stack([means - state[:, 0] - SEEN * self.run.sag * state[:, 2], wider])
 
     def _switches_missed(
         self, lo: int, hi: int, h: FloatArray, state: FloatArray, jerk: FloatArray

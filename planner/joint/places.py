@@ -6,14 +6,20 @@ from planner.joint.row_kinds import SETS, THIRD
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _place_on_line(axes, group, i, sag, x, u, part):
+def rest_of(rest, of, part, k):
+    """Of an axis, what the rest (2, A) of a step adds to its node, inner control points or end (0 to 3) of a set."""
+    return of * (rest[0, k] + part * THIRD * (rest[1, k] - rest[0, k]))
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _place_on_line(axes, group, i, of, x, u, part):
     """The place on the leg of step i that is nearest to its node, first or second inner control point (0 to 2), or its
-    end, the node x (3), of the set with that sag."""
-    h = u[axes]
+    end, the node x (3), of a set."""
+    h, sag = u[axes], group.sag[of]
     along = 0.0 * h
     for k in range(axes):
         a = x[2 * axes + k]
-        c, v = x[k] + sag * a, x[axes + k] + sag * u[k]
+        c, v = x[k] + sag * a + rest_of(group.rest[i], of, part, k), x[axes + k] + sag * u[k]
         if part == 1:
             c = c + THIRD * h * v
         elif part == 2:
@@ -35,18 +41,18 @@ def _put_places(sizes, group, of, x, u, rows, nearest, top):
     back as far as one place is near enough to what it passes twice. They are halfway between the largest nearest place
     before and the smallest one behind, so that the farthest is moved by as little as can be; nearest (N, 3) and
     top (N,) are overwritten."""
-    axes, N, sag, column = len(sizes.axes), sizes.steps, group.sag[of], 3 * of
+    axes, N, column = len(sizes.axes), sizes.steps, 3 * of
     low, end = 0.0 * u[0, axes], 0.0 * u[0, axes]
     for i in range(N):
         h = u[i, axes]
         for m in range(3):
-            nearest[i, m] = _place_on_line(axes, group, i, sag, x[i], u[i], m)
+            nearest[i, m] = _place_on_line(axes, group, i, of, x[i], u[i], m)
         begins = group.begins[i] > 0.0
         nearest[i, 0] = where(begins, where(group.at_vertex[i] > 0.0, 0.0 * h, nearest[i, 0]), nearest[i, 0])
         low = where(begins, nearest[i, 0], low)
         last = group.last[i] > 0.0
         if anywhere(last):
-            end = where(last, larger(_place_on_line(axes, group, i, sag, x[i + 1], u[i], 3), low), end)
+            end = where(last, larger(_place_on_line(axes, group, i, of, x[i + 1], u[i], 3), low), end)
     behind = end
     for i in range(N - 1, -1, -1):
         ends = group.ends[i] > 0.0

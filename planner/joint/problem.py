@@ -23,6 +23,12 @@ from planner.joint.switches import Beside, no_rows_beside
 NARROWED = 2.0
 # Of the largest length of a step on an arc [-]: h (v + a h/2) stands for it, which leaves out h3 j/6.
 STEP_SHARE = 0.95
+# Of the sag of chords that rows know, where they are told the rest [-]: the middle of a chord sees cos(w tau) of a wave
+# exp(i w t), tau = dt/2, and rows 1 - SEEN (w tau)^2/2. With this both are 0 at w tau = pi/2, their ratio is between 0 and 1 up to
+# 3 pi/2, and what is told comes to rest; with 1 it does not between 1.33 and 1.57.
+SEEN = 8.0 / np.pi**2
+# What chords leave of the room of a node at a vertex at least [-].
+LEAST_ROOM = 0.2
 
 
 class StepWindow(NamedTuple):
@@ -55,6 +61,7 @@ def window_of(
     smooth: float = 0.0,
     which: Array | None = None,
     beside: Beside | None = None,
+    rest: FloatArray | None = None,
 ) -> StepWindow:
     """The steps lo .. hi - 1 of a guess, in the units of their mean.
 
@@ -63,6 +70,7 @@ def window_of(
     smooth : weight of the jerk against the time at least [-] (numbers.py)
     which  : of the laws, those that have rows; None for those that the guess is near to
     beside : nodes beside a vertex where the feed changes, and places that stand for one
+    rest   : of `Window`; None for 0
     """
     cut = Window(guess, lo, hi)
     part, leg = slice(cut.lo, cut.hi), cut.leg[cut.lo : cut.hi]
@@ -83,10 +91,18 @@ def window_of(
     jerks = np.diff(state[:, 2], axis=0) / h[:, None]
     place = np.tile((cut.place[part, :3] - run.offset[leg][:, None]) / length, rows.SETS)
     beside = no_rows_beside(len(leg), len(run.axis)) if beside is None else beside
+    sag = run.sag if rest is None else SEEN * run.sag
+    rest = np.zeros((len(leg) + 1, len(run.axis) + 1)) if rest is None else rest / length
+    rest, less = rest[:, :-1], rest[:-1, -1]
     limits = _limits(run, cut, units, (missed, tight), laws, smooth, beside)
     return StepWindow(
         legs=_legs(run, of, units),
-        limits=limits._replace(leg=leg - of.start),
+        limits=limits._replace(
+            leg=leg - of.start,
+            sag=np.array([0.0, sag / second**2]),
+            rest=np.stack([rest[:-1], rest[1:]], axis=1),
+            room_node=np.maximum(limits.room_node - less, LEAST_ROOM * limits.room_node),
+        ),
         x=x,
         u=np.column_stack([jerks / jerk, h / second]),
         place=np.ascontiguousarray(place),
@@ -186,7 +202,8 @@ def _limits(
         box=axes * inside,
         room=room / length,
         room_node=room_node / length,
-        sag=np.array([0.0, run.sag / second**2]),
+        sag=np.empty(0),
+        rest=np.empty((0, 2, len(run.axis))),
         feed=feed * inside / speed,
         feed_node=np.minimum(feed, np.append(feed[0], feed[:-1])) * inside / speed,
         normal=normal * inside / acc,

@@ -46,6 +46,7 @@ class StepLimits(NamedTuple):
     room: FloatArray  # (N,) of inner control points
     room_node: FloatArray  # (N,) of the node
     sag: FloatArray  # (2,) of each set, in time^2: 0 of setpoints, `TubeRun.sag` of chords
+    rest: FloatArray  # (N, 2, A) of chords, what they are off beside that, at both nodes
     feed: FloatArray  # (N,)
     feed_node: FloatArray  # (N,)
     normal: FloatArray  # (N,)

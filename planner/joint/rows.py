@@ -28,7 +28,8 @@ the row is |y| <= r, r^2 = F^2 + |a h/4|^2 kept, and the other two likewise.
 Between two setpoints the motion is their chord, in the middle of a period (p(t-) + p(t+))/2 = p + dt2/8 a of a cubic, and
 behind filters with the time constants T it is p + sum T2/24 a. So there are two sets of rows of the tolerance, of p + k a:
 of the setpoints, k = 0, and of the middles of chords behind filters, k = `TubeRun.sag`; all else lies between them. Each is
-a cubic with the state p + k a, v + k j, a. Of chords and filters longer than steps, what is found is looked at (checks.py).
+a cubic with the state p + k a, v + k j, a. Of chords and filters longer than steps, what is found is looked at (checks.py),
+and rows are told the rest that they are off at the nodes, linear in between.
 
 The tolerance is g = (d2/room2 - 1)/2 with the distance d to the nearest point of the leg (at a vertex: to the
 vertex), along which n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is
@@ -51,7 +52,7 @@ plane through V either that is across the direction t of the start, m (p - V).t 
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import anywhere, larger, magnitude, where
 from planner.joint.normal_rows import put_normal_rows
-from planner.joint.places import put_places
+from planner.joint.places import put_places, rest_of
 from planner.joint.row_kinds import (
     ACROSS,
     ARC,
@@ -104,7 +105,7 @@ def turn_of(axes, x):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def _put_vectors(axes, sag, x, u, y):
+def _put_vectors(axes, sag, rest, x, u, y):
     """y (18, A) of a step with the node x (3 A,) and the controls u (A+1,)."""
     h, turn = u[axes], turn_of(axes, x)
     for k in range(axes):
@@ -118,6 +119,8 @@ def _put_vectors(axes, sag, x, u, y):
             y[at, k], y[at + 1, k] = q, q + h * w * THIRD
             y[at + 2, k] = q + h * THIRD * (2.0 * w + 0.5 * h * a)
             y[at + 3, k] = q + h * (w + h * (0.5 * a + h * j * SIXTH))
+            for part in range(OF_SET):
+                y[at + part, k] += rest_of(rest, m, part, k)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -171,7 +174,7 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
     for i in range(N):
         g, h = rows.g[i], u[i, axes]
         bent = bent_at(sizes, group, i)
-        _put_vectors(axes, group.sag, x[i], u[i], y)
+        _put_vectors(axes, group.sag, group.rest[i], x[i], u[i], y)
         for m in range(4):
             for k in range(axes):
                 share = y[VECTOR_OF_BOX[m], k] * group.per_box[m, k]

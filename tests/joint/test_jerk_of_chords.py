@@ -2,9 +2,15 @@
 
 import numpy as np
 import pytest
+from starts import begun
 
-from benchmarks.jobs import problems
-from planner.joint import numbers
+import planner
+from benchmarks.jobs import problems, random_lines
+from planner.base.arrays import read_only
+from planner.joint import numbers, own
+from planner.joint.checks import chord_means
+from planner.joint.motion import integrated
+from planner.joint.problem import SEEN
 from planner.machine import load_machine
 from planner.planning.job.trace import Trace
 from planner.planning.methods.optimal import OptimalMethod
@@ -56,7 +62,7 @@ def wave(blocks, seed):
 
 
 def test_at_two_milliseconds_what_is_found_passes_as_it_is(monkeypatch):
-    """And is not run slower in places, which costs more than a tenth of the time here."""
+    """And is not run slower in places, which costs more than a hundredth of the time here."""
     program, machine = wave(60, 1), load_machine("mill").model_copy(update={"dt": H})
     times = []
     for most in (numbers.CHORDS, 0.0):
@@ -67,4 +73,55 @@ def test_at_two_milliseconds_what_is_found_passes_as_it_is(monkeypatch):
         slower = any(step.name == "slower in places" for step in trace.steps)
         assert slower == (most == 0.0)
         times.append(plan.cycle_time)
-    assert times[0] < 0.9 * times[1]
+    assert times[0] < 0.99 * times[1]
+
+
+def test_what_rows_are_told_of_chords_comes_to_rest():
+    """Of any wave, its rows and its chords tell in one direction, rows the more: what is left of an error shrinks."""
+    x = np.linspace(1e-3, 1.5 * np.pi - 1e-3, 2000)
+    left = [1.0 - np.cos(x) / (1.0 - seen * x**2 / 2) for seen in (SEEN, 1.0)]
+    assert np.abs(left[0]).max() < 1.0
+    assert np.abs(left[1]).max() > 1.0
+
+
+def test_means_of_chords_are_those_of_the_motion():
+    """With chords longer than steps; beside a vertex no chord is farther than it says."""
+    run, _ = begun("corner")
+    rng, steps = np.random.default_rng(7), 24
+    h, jerk = rng.uniform(1e-3, 4e-3, steps), run.jerk * rng.uniform(-1.0, 1.0, (steps, 2))
+    state = integrated(np.array([[39.9, 0.0], [50.0, 5.0], [0.0, 0.0]]), h, jerk)
+    leg = np.repeat([0, 1], steps // 2)
+    half = 4e-3
+    keeps = own.keeps_of(run)._replace(chord=half)
+    means, wider = chord_means(keeps, read_only(leg), h, state, jerk)
+    node = np.append(0.0, np.cumsum(h))
+
+    def at(t):
+        n = min(int(np.searchsorted(node, t, side="right")) - 1, steps - 1)
+        p, v, a = state[n]
+        t -= node[n]
+        return p + t * (v + t * (a / 2 + t * jerk[n] / 6))
+
+    inside = [i for i in range(steps) if half * 2 < node[i] < node[-1] - half * 2]
+    for i in inside:
+        np.testing.assert_allclose(means[i], (at(node[i] - half) + at(node[i] + half)) / 2, rtol=1e-12)
+    vertex = int(np.flatnonzero(np.diff(leg))[0]) + 1
+    far = [
+        np.linalg.norm(
+            (1 - u) * at(node[vertex] - 2 * u * half)
+            + u * at(node[vertex] + 2 * (1 - u) * half)
+            - run.vertex[1]
+        )
+        for u in np.linspace(0.1, 0.9, 9)
+    ]
+    assert max(far) - far[4] == pytest.approx(wider[vertex], abs=1e-9)
+    assert not wider[np.arange(steps + 1) != vertex].any()
+
+
+def test_at_long_periods_the_search_passes_and_is_not_given_up():
+    """Blocks far shorter than a period, whose chords are longer than steps."""
+    program, machine = random_lines.job(119)
+    assert machine.dt == 0.016
+    plan = planner.plan(program, machine).require()
+    assert plan.verdict.passed
+    assert "optimised together" in plan.sentence

@@ -11,7 +11,8 @@ above 0 where a motion goes away from it; where the feed falls that is backwards
 Vertices that are nearer to each other than the tolerance may be passed together, a short block with an F of its own as well as
 the points of a narrow arc, of which one is passed every `MARK`. There the motion is at all of them in order, at the places
 that are together nearest (least sum of squares); of those that would be out of order that is one place, nearest to their mean, which
-stands for the vertex. Between the places of a slow block no step may be faster than its F, whichever leg it belongs to.
+stands for the vertex: what is nearest to the vertex itself does not count. Between the places of a slow block no step may be faster
+than its F, whichever leg it belongs to.
 """
 
 from typing import NamedTuple
@@ -20,9 +21,10 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
-from planner.joint.run import TOGETHER, TubeRun
+from planner.joint.run import TubeRun
 
 DEGREE = 5  # of f
+PARTS = 8  # of a step, at which the order of places is looked for [-]
 HALVED = 60  # a zero is between two places that are halved so often [-]
 AWAY = 1e-12  # rounding of distances to a vertex, in tolerances and of the places themselves [-]
 SAME = 1e-9  # rounding of a feed, as a share of it, and of a place, in steps [-]
@@ -138,58 +140,58 @@ def _least(vertex, begin, jerk, h, way):
 
 
 @njit(cache=True, error_model="numpy")
-def _on_step(point, state, jerk, h, reach, room):
-    """Squared distance of a point from a step that begins with `state` (3, A), and the share of the step where it is nearest;
-    not looked for where that is farther than `reach`; room: p and v (2, A), and 7 places."""
-    (d, v), places, off, run = room[0], room[1], 0.0, 0.0
-    for k in range(len(point)):
-        d[k], v[k] = state[0, k] - point[k], state[1, k]
-        off += d[k] * d[k]
-        run += abs(h * v[k]) + h * h * (abs(state[2, k]) + abs(h * jerk[k]))
-    if np.sqrt(off) - run > reach:
-        return off, 0.0
-    square, share, _ = _nearest(d, v, state[2], jerk, h, places)
-    return square, share
+def _beside(point, first, last, state, jerk, h, room):
+    """Where N steps are nearest to a point beside the places `first` to `last` of their `PARTS`, in steps; room: p, v and a
+    (3, A), and 7 places."""
+    (d, v, a), places = room
+    best, at = np.inf, 0.0
+    for q in range(max(first - 1, 0), min(last + 1, len(h) * PARTS)):
+        n = q // PARTS
+        t = h[n] * (q / PARTS - n)
+        for k in range(len(point)):
+            a[k], v[k] = (
+                state[n, 2, k] + t * jerk[n, k],
+                state[n, 1, k] + t * (state[n, 2, k] + t * jerk[n, k] / 2.0),
+            )
+            d[k] = state[n, 0, k] - point[k] + t * (v[k] - t * (a[k] / 2.0 - t * jerk[n, k] / 6.0))
+        square, share, _ = _nearest(d, v, a, jerk[n], h[n] / PARTS, places)
+        if square < best:
+            best, at = square, (q + share) / PARTS
+    return at
 
 
 @njit(cache=True, error_model="numpy")
-def places_in_order(points, state, jerk, h, reach):
+def places_in_order(points, state, jerk, h):
     """Where N steps are at the points (P, A) in order: at their places (P,), in steps; and the points (P, A) that stand for
-    them, means of those that are passed together."""
-    count, steps = len(points), len(h)
-    cost, share = np.zeros(steps), np.zeros((count, steps))
-    better = np.zeros((count, steps), np.bool_)
-    room = np.zeros((2, points.shape[1])), np.zeros(DEGREE + 2)
+    them, means of those that are passed together. In order are those of `PARTS` places of every step with the least sum."""
+    count, many = len(points), len(h) * PARTS + 1
+    cost, better = np.zeros(many), np.zeros((count, many), np.bool_)
     for i in range(count):
         least = np.inf
-        for n in range(steps):
-            square, share[i, n] = _on_step(points[i], state[n], jerk[n], h[n], reach, room)
-            square += cost[n]
-            better[i, n] = square < least
-            cost[n] = least = min(least, square)
-    step, n = np.zeros(count, np.int64), steps - 1
+        for q in range(many):
+            n = min(q // PARTS, len(h) - 1)
+            t, square = h[n] * (q / PARTS - n), cost[q]
+            for k in range(points.shape[1]):
+                off = t * (state[n, 1, k] + t * (state[n, 2, k] / 2.0 + t * jerk[n, k] / 6.0))
+                square += (state[n, 0, k] - points[i, k] + off) ** 2
+            better[i, q] = square < least
+            cost[q] = least = min(least, square)
+    part, q = np.zeros(count, np.int64), many - 1
     for i in range(count - 1, -1, -1):
-        while not better[i, n]:
-            n -= 1
-        step[i] = n
+        while not better[i, q]:
+            q -= 1
+        part[i] = q
+    room = np.zeros((3, points.shape[1])), np.zeros(DEGREE + 2)
     place, group, stands = np.zeros(count), np.ones(count, np.int64), points.copy()
     for i in range(count):
-        place[i], n = step[i] + share[i, step[i]], i
-        while n > 0 and place[n] < place[n - 1]:
+        place[i], n = _beside(points[i], part[i], part[i], state, jerk, h, room), i
+        while n > 0 and place[n] <= place[n - 1]:
             n -= group[n - 1]
             for m in range(n, i + 1):
                 for k in range(points.shape[1]):
                     stands[m, k] = points[n : i + 1, k].mean()
-            here = step[i]
-            square, at = _on_step(stands[i], state[here], jerk[here], h[here], np.inf, room)
-            for way in (-1, 1):
-                while 0 <= here + way < steps:
-                    m = here + way
-                    other, there = _on_step(stands[i], state[m], jerk[m], h[m], np.inf, room)
-                    if other >= square:
-                        break
-                    here, square, at = m, other, there
-            place[n : i + 1], step[n : i + 1], group[n : i + 1] = here + at, here, i + 1 - n
+            place[n : i + 1] = _beside(stands[i], part[n], part[i], state, jerk, h, room)
+            group[n : i + 1] = i + 1 - n
     return place, stands
 
 
@@ -238,14 +240,14 @@ def _together(run: TubeRun, r: int) -> tuple[FloatArray, Array]:
 
 def _too_fast(
     run: TubeRun, r: int, leg: Array, h: FloatArray, state: FloatArray, jerk: FloatArray
-) -> tuple[Array, FloatArray]:
+) -> tuple[Array, FloatArray, bool]:
     """The nodes of N steps that are beyond the vertex, where leg r begins, on the slower side, and run at more than its F
-    meanwhile; and the point (A,) that stands for the vertex (module text)."""
+    meanwhile; the point (A,) that stands for the vertex (module text), and whether that is the vertex alone."""
     points, of = _together(run, r)
     legs = of[of >= 0]
     steps = np.arange(*np.searchsorted(leg, [legs[0] - 1, legs[-1] + 1]))
     part = state[steps], jerk[steps], h[steps]
-    place, stands = places_in_order(points, *part, TOGETHER * float(run.vertex_budget[r]))
+    place, stands = places_in_order(points, *part)
     at, falls = int(np.flatnonzero(of == r)[0]), run.switch[r] > 0.0
     edges = np.concatenate([[-np.inf], place[of >= 0], [np.inf]])  # of the legs from legs[0] - 1 on
     fast = np.zeros(len(steps), dtype=bool)
@@ -253,7 +255,7 @@ def _too_fast(
         begin, end = edges[leg_on + 1 - legs[0] :][:2]
         fast |= _fast_steps(*part, begin, end, float(run.feed[leg_on]))
     fast &= (leg[steps] < r) == falls
-    return steps[fast] + int(falls), stands[at]
+    return steps[fast] + int(falls), stands[at], np.count_nonzero(place == place[at]) == 1
 
 
 def switches_missed(
@@ -262,8 +264,9 @@ def switches_missed(
     """Where N steps run at the larger of two feeds while they are still to be nearer to the vertex between them, in the
     steps `part`, the nodes inside it that get a row for it: that of the vertex; those of the faster leg that are nearer, and
     those within the budget of the vertex on which the way to it is the wrong one; and the node before a step that comes
-    nearer between nodes, which is to be further from the vertex by as much. Where vertices may be passed together and none is
-    missed so, the nodes of the steps that are too fast between the places of a slow block. None where there are none.
+    nearer between nodes, which is to be further from the vertex by as much. Of a vertex that is passed together with others, where
+    the place that counts is not its own, and of one beside others that is not missed so: the nodes of the steps that are too fast
+    between the places of a slow block. None where there are none.
 
     leg (N,), h (N,) [s], state (N+1, 3, A) [mm, s], jerk (N, A)
     """
@@ -276,13 +279,15 @@ def switches_missed(
         if run.switch[r] == 0.0:
             continue
         legs = (np.arange(edges[k], node), np.arange(node, edges[k + 2]))
-        found = _passed_late(run, r, legs, h, state, jerk, (begin, end), rows)
-        if not found and run.crowded[r] and not run.word.shape[1]:
-            wrong, at = _too_fast(run, r, leg, h, state, jerk)
-            if len(wrong):
-                wrong = np.append(wrong, node)
-                wrong = wrong[(wrong > begin) & (wrong < end)]
-                rows.leg[wrong], rows.at[wrong] = r, at
+        wrong, at, alone = np.zeros(0, dtype=int), run.vertex[r], True
+        if run.crowded[r] and not run.word.shape[1]:
+            wrong, at, alone = _too_fast(run, r, leg, h, state, jerk)
+        if alone and _passed_late(run, r, legs, h, state, jerk, (begin, end), rows):
+            continue
+        if len(wrong):
+            wrong = np.append(wrong, node)
+            wrong = wrong[(wrong > begin) & (wrong < end)]
+            rows.leg[wrong], rows.at[wrong] = r, at
     rows.leg[: begin + 1] = -1
     return Beside(*(column[part] for column in rows)) if (rows.leg[part] >= 0).any() else None
 

@@ -24,6 +24,7 @@ class Tried:
     joint: bool = False  # whether the best is of the joint search
     steps: int = 0  # of constant jerk, that the joint search has
     left: bool = True  # whether the joint search has anything to gain
+    began: float = float("inf")  # time of the motion that the joint search began with [s]
 
 
 class Attempt(NamedTuple):

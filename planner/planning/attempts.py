@@ -2,7 +2,8 @@
 
 The joint search ends where it ends from any start nearby, so it begins on splines with a motion that need not
 be fit for delivery. Where it does not end it begins once more from one that is, which stays where it fails
-again; where it cannot run, or leaves something, the motion on that path is delivered.
+again; where it cannot run, leaves something, or ends at more time than it began with, the motion on that
+path is delivered.
 """
 
 from __future__ import annotations
@@ -69,7 +70,8 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
     kept = cache(partial(kept_on_path, settings=settings))
     found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings, kept))
     joint = found.plan is not None
-    return Tried(best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower)
+    began = first.solution.cycle_time
+    return Tried(best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower, began=began)
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
@@ -94,12 +96,12 @@ def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether there is no plan yet, or the motion on the path takes less time, or may behind long filters."""
+    """Whether there is no plan yet, or the motion on the path takes less time, as far as it is known, or may
+    behind long filters."""
     if filters_count(*job.real):
         return True
-    if tried.path is None:
-        return tried.best is None
-    return tried.path[1].end < (1.0 - SAME_TIME) * counted_time(tried.best)
+    before = tried.began if tried.path is None else tried.path[1].end
+    return tried.best is None or before < (1.0 - SAME_TIME) * counted_time(tried.best)
 
 
 def _on_path(job: Job, settings: Settings, tried: Tried) -> Tried:

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 from quick import slow_but
 
+import planner
+from benchmarks.jobs.problems import five_points
+from benchmarks.jobs.published import paper_002
 from benchmarks.jobs.random_lines import job
 from benchmarks.runner.figures_of_merit import ALLOWED, beaten
 from benchmarks.runner.measure import outcome
 from benchmarks.runner.rows import ERROR, METHOD, Row
 from benchmarks.runner.suites import RANDOM_RIVALS, Job
 from benchmarks.runner.ways import way_of
+from planner.base.names import AUTO, SPLINE
 from planner.baselines.lookahead.rest_to_rest import parts_of
 from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine
 from planner.nc.reader import parse_program
+from planner.planning.attempts import SAME_TIME
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.registry import plan
 from planner.planning.methods.stop import StopMethod
@@ -35,6 +42,14 @@ def test_nothing_is_faster_than_optimal(seed):
     against = beaten({"random": rows})
     assert "stop" in against
     assert [way for way, by in against.items() if by["random"] > ALLOWED] == []
+
+
+@pytest.mark.parametrize("made", [partial(job, 197), lambda: (five_points(), paper_002())])
+def test_a_search_that_ends_above_the_motion_that_it_began_with_is_not_delivered(made):
+    program, machine = made()
+    plans = [planner.plan(program, machine, geometry=geometry) for geometry in (AUTO, SPLINE)]
+    assert all(plan.verdict.passed for plan in plans)
+    assert plans[0].cycle_time < (1.0 + SAME_TIME) * plans[1].cycle_time
 
 
 def test_the_plan_says_when_the_closed_form_takes_its_place():

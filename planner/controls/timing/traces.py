@@ -77,6 +77,10 @@ def read_trace(path: str | Path) -> Trace:
             data = gzip.decompress(data)
     except (OSError, EOFError) as fault:
         raise InputError(f"the file cannot be read: {fault}", source=source) from fault
+    if b"\0" in data:
+        raise InputError(
+            "a binary file; a trace is CSV, a log of halscope or Klipper's motion log", source=source
+        )
     if data.lstrip()[:1] == b"{":
         return _of_klipper(data, source)
     lines = data.decode("utf-8", errors="replace").splitlines()

@@ -100,7 +100,9 @@ def read_trace(path: str | Path) -> Trace:
         table = np.loadtxt(lines[first:], delimiter=mark, usecols=columns, ndmin=2)
     except ValueError as fault:
         row = re.search(r"at row (\d+)", str(fault))
-        line = first + int(row[1]) + ("changed" not in str(fault)) if row else None  # which numpy counts from 1
+        line = (
+            first + int(row[1]) + ("changed" not in str(fault)) if row else None
+        )  # which numpy counts from 1
         raise InputError(re.split(";| at row", str(fault))[0], source=source, line=line) from None
     if len(table) < LEAST or table.shape[1] != len(names):
         said = f"{len(table)} samples of {table.shape[1]} numbers and {len(names)} names"

@@ -31,6 +31,7 @@ _NUMBER = re.compile(r"Input should be a valid (number|integer).*|'.*' is not a 
 # Options that most people need; a command with more than `LONG` of them has the others below (count of rows).
 FIRST = ("machine", "tolerance", "output", "report", "units", "verbose", "changes", "vary")
 LONG = 16
+NEAR = 0.7  # how like a wrong option one must be that is named, of 1
 _LEAST = re.compile(r"Input should be greater than or equal to (\S+)")
 
 
@@ -83,7 +84,7 @@ def _plain(fault: Any, options: list[str]) -> None:
     """Change the message of a usage fault, in place."""
     wrong = getattr(fault, "option_name", None)
     if getattr(fault, "possibilities", None) and wrong:
-        near = difflib.get_close_matches(wrong, options, n=1)
+        near = difflib.get_close_matches(wrong, options, n=1, cutoff=NEAR)
         fault.message = f"no option {wrong}" + (f"; did you mean {near[0]}?" if near else "")
         fault.possibilities = None
     if type(fault).__name__ == "MissingParameter" and not fault.message:

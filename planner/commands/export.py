@@ -185,7 +185,8 @@ def _saved(plan: Path) -> Plan:
     from planner.report.html.saved import saved_plan
 
     if not plan.is_dir():
-        text = "give the directory that 'plan -o' wrote: the program is needed too"
+        there = "" if plan.exists() else "no such directory; "
+        text = f"{there}give the directory that 'plan -o' wrote: the program is needed too"
         raise InputError(text, source=str(plan))
     return saved_plan(plan)[0]
 

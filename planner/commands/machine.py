@@ -76,7 +76,7 @@ def import_file(
         Path,
         typer.Argument(
             metavar="SETTINGS",
-            help="LinuxCNC's INI file, what $$ of grbl or M503 of Marlin printed, or Klipper's printer.cfg",
+            help="LinuxCNC's INI file, what $$ of grbl or M503 of Marlin printed, Klipper's printer.cfg, or RepRapFirmware's config.g",
         ),
     ],
     output: Annotated[Path, output_option("FILE", "machine file to write (.toml)")],

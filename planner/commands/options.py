@@ -18,7 +18,7 @@ from planner.nc.reading import ARC_CENTRES, DIALECTS, EXTRUDERS, Reading, ignore
 
 DEFAULT_MACHINE = "mill"
 # Units of a length on the command line [mm].
-LENGTHS = {"mm": 1.0, "um": MICROMETRE, "µm": MICROMETRE, "in": MM_PER_INCH}
+LENGTHS = {"mm": 1.0, "um": MICROMETRE, "µm": MICROMETRE, "in": MM_PER_INCH, "inch": MM_PER_INCH}
 # Units of a time on the command line [s].
 TIMES = {"s": 1.0, "ms": MILLISECOND}
 

@@ -35,8 +35,8 @@ from planner.nc.program import MOVES, Kind, PathControl, Program
 # Turning angle below which two tangents are the same [rad]: coordinates of 1e3 mm have 1e-13 mm of rounding,
 # and at 1e-8 rad the velocity jumps by 1e-6 mm/s at 100 mm/s, below any drive's resolution.
 COLLINEAR_ANGLE = 1e-8
-# Coordinates beyond this have lost the micrometre in float64 products and are certainly a mistake [mm].
-COORDINATE_MAX = 1e9
+# Coordinates beyond this are certainly a mistake, ten kilometres [mm]; beyond 1e9 float64 loses the micrometre.
+COORDINATE_MAX = 1e7
 # A move shorter than this goes nowhere [mm]: a picometre, the rounding of coordinates around 1e3 mm.
 ZERO_LENGTH = 1e-9
 
@@ -60,7 +60,8 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     axes = tuple(program.axes[k] for k in axis)
     machine.limits("velocity", axes)
     if not len(program):
-        raise InputError("the program has no move", source=program.source)
+        said = "".join(f" ({text})" for text in program.assumptions[:1])
+        raise InputError(f"the program has no move{said}", source=program.source)
     _check_coordinates(program)
     position = np.vstack([program.start, program.end])
     chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
@@ -199,7 +200,7 @@ def _check_coordinates(program: Program) -> None:
         axis = int(np.abs(program.end[block]).argmax())
         raise InputError(
             f"{program.axes[axis].upper()} = {program.end[block, axis]:g} mm; coordinates up to {COORDINATE_MAX:g} mm "
-            "are allowed",
+            "are allowed: a digit too many, or a point missing?",
             source=program.source,
             line=int(program.line[block]),
         )

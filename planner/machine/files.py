@@ -14,6 +14,7 @@ from planner.machine.whole import Machine
 
 # What settings of a control have and no machine file has: sections of LinuxCNC and Klipper, numbers of grbl,
 # commands of Marlin.
+_DECIMAL = re.compile(r"^[^#\"'\[]*=\s*(\d+),(\d+)\s*(?:#.*)?$", re.MULTILINE)  # 0,001
 _SETTINGS = re.compile(
     r"^\s*(\[(EMC\w*|TRAJ|AXIS_\w|printer)\]|\$\d+\s*=|(echo:)?\s*M20[13]\s+X)", re.MULTILINE
 )
@@ -52,7 +53,9 @@ def load_machine(path: str | Path) -> Machine:
         reason = (
             fault if isinstance(fault, tomllib.TOMLDecodeError) else "a number has more than 4,300 digits"
         )
-        raise InputError(f"not valid TOML: {reason}{settings}", source=source) from fault
+        decimal = _DECIMAL.search(text)
+        comma = f"; decimals have a point: {decimal[1]}.{decimal[2]}" if decimal else ""
+        raise InputError(f"not valid TOML: {reason}{comma}{settings}", source=source) from fault
     return machine_from_dict(data, source=source)
 
 
@@ -95,7 +98,8 @@ def _read(path: Path) -> str:
         near = difflib.get_close_matches(str(path), [*builtin_machines(), *there], n=1)
         hint = f" (did you mean '{near[0]}'?)" if near else ""
         raise InputError(
-            f"machine file not found; give a TOML file or one of the built-in machines: {names}{hint}",
+            f"machine file not found; give a TOML file or one of the built-in machines: {names}{hint}; make one with: planner "
+            "machine init FILE, or from a control's settings: planner machine import",
             source=str(path),
         ) from fault
     except IsADirectoryError as fault:

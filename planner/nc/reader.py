@@ -13,7 +13,7 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.base.files import STDIN, require_ending, standard_input
-from planner.machine import Machine, load_machine
+from planner.machine import EXTRUDER, Machine, load_machine
 from planner.nc.capped import capped
 from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
@@ -35,6 +35,7 @@ from planner.nc.reading import (
     KLIPPER,
     LATHE,
     LINUXCNC,
+    PRINTER,
     SIEMENS,
     Reading,
 )
@@ -166,7 +167,9 @@ def execute(
         mark = "its %_N_" if interpreter.archive else detect.siemens_mark(words, source)
     language = SIEMENS if mark else language
     calls = called is not None and called.dialect == KLIPPER
-    prints = calls or (language != SIEMENS and not reading.strict and is_printer(words))
+    prints = calls or language == PRINTER
+    if language != SIEMENS and not reading.strict:
+        prints |= is_printer(words) or (machine is not None and EXTRUDER in machine.axes)
     if prints:
         interpreter.ignored.read_printer()
     if language != SIEMENS and not reading.strict and (units := detect.units(words)):

@@ -25,8 +25,10 @@ EXTRUDERS = (AUTO, REFUSE, IGNORE)
 LINUXCNC, FANUC, HEIDENHAIN, SIEMENS = "linuxcnc", "fanuc", "heidenhain", "siemens"
 KLIPPER, CL = "klipper", "apt"  # whose macros a program calls; CL files
 LATHE = "lathe"  # Fanuc's on a lathe, which the program's words tell
+PRINTER = "printer"  # a program is one for a 3-D printer, whatever its words tell
 _ALIASES = {"haas": FANUC, "grbl": LINUXCNC, "sinumerik": SIEMENS}
-DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS, *_ALIASES)
+_ALIASES |= dict.fromkeys(("marlin", KLIPPER, "reprapfirmware"), PRINTER)
+DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS, PRINTER, *_ALIASES)
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
 _OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?|[A-Z]*_\w+")
 _LINES = re.compile(r"(\d+)(?:-(\d+))?")
@@ -51,8 +53,8 @@ class Reading:
     extruder     : what is done with the E words of 3-D printers: "auto" follows them on a machine with an axis
                    e, and else leaves them out and says so; "refuse" or "ignore"
     dialect      : whose language parameters, expressions and subprograms are, and the unit of dwells:
-                   "linuxcnc", "fanuc" (Haas too), "heidenhain", "siemens", or "auto", by what the program
-                   holds
+                   "linuxcnc", "fanuc" (Haas too), "heidenhain", "siemens", "printer" (Marlin, Klipper), or
+                   "auto", by what the program holds
     block_delete : leave out the lines that start with "/"
     ignore_travel : plan what the travel of the machine's axes does not reach
     feed_caps    : file of feeds that hold where they are below F, or what was read from one

@@ -48,7 +48,10 @@ def test_a_wrong_turn_is_answered_with_the_right_one(words: list[str], said: str
 def test_a_tolerance_that_is_none_is_refused_before_any_work(given: str) -> None:
     done = run("plan", "nowhere.nc", "--tolerance", given)
     assert done.exit_code == 2
-    assert f"'{given}' is no length above 0; write one in mm, or with a unit: mm, um, µm, in" in done.output
+    assert (
+        f"'{given}' is no length above 0; write one in mm, or with a unit: mm, um, µm, in, inch"
+        in done.output
+    )
 
 
 @pytest.mark.parametrize("given", ["0.04", "40um", "40 µm", "4e-2mm", "0.0015748031496062992in"])

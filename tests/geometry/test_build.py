@@ -259,7 +259,7 @@ def test_an_axis_that_never_moves_may_be_missing():
 
 def test_coordinates_beyond_all_machines_are_refused_with_their_line():
     far = problems.polyline([[0, 0], [1, 0], [1, -2 * COORDINATE_MAX]])
-    with pytest.raises(InputError, match=r"polyline:2: Y = -2e\+09 mm"):
+    with pytest.raises(InputError, match=r"polyline:2: Y = -2e\+07 mm"):
         toolpath_from_program(far, MACHINE)
 
 
@@ -298,7 +298,7 @@ def test_random_walks_keep_their_points(seed):
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, 9e-6, 1e-320, 1e10, np.nan, np.inf])
 def test_a_tolerance_of_no_machine_is_refused(tolerance):
     """Found by fuzzing: distances over a tolerance of 1e-320 mm overflow."""
-    with pytest.raises(InputError, match=r"must be between 1e-05 and 1e\+09"):
+    with pytest.raises(InputError, match=r"must be between 1e-05 and 1e\+07"):
         build("G1 X1\nY1", tolerance=tolerance)
 
 

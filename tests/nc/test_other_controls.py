@@ -10,6 +10,7 @@ import pytest
 from same_program import same_motion
 
 from planner.base.errors import InputError
+from planner.machine import load_machine
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
@@ -202,7 +203,21 @@ def test_commands_are_left_out_by_name() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "means"), [("haas", "fanuc"), ("grbl", "linuxcnc"), ("sinumerik", "siemens")]
+    ("name", "means"),
+    [("haas", "fanuc"), ("grbl", "linuxcnc"), ("sinumerik", "siemens"), ("klipper", "printer")],
 )
 def test_controls_have_the_dialect_of_another(name: str, means: str) -> None:
     assert Reading(dialect=name) == Reading(dialect=means)
+
+
+def test_the_dialect_of_printers_holds_where_no_word_tells_it() -> None:
+    """G4 P is in ms there; a program that computes is read as before."""
+    text = "G21 G90\nG1 X10 F600\nG4 P500\nG1 X20\n"
+    (said,) = parse_program(text).assumptions
+    assert "a dwell of 500 s" in said
+    assert "--dialect fanuc, or marlin" in said
+    assert float(parse_program(text, load_machine("ender3")).dwell.sum()) == pytest.approx(0.5)
+    program = parse_program(text, reading=Reading(dialect="marlin"))
+    assert float(program.dwell.sum()) == pytest.approx(0.5)
+    computed = parse_program("#1 = 7\nG1 X#1 F600\n", reading=Reading(dialect="marlin"))
+    assert computed.end[-1, 0] == 7.0

@@ -77,6 +77,10 @@ def read_trace(path: str | Path) -> Trace:
             data = gzip.decompress(data)
     except (OSError, EOFError) as fault:
         raise InputError(f"the file cannot be read: {fault}", source=source) from fault
+    if b"\0" in data:
+        raise InputError(
+            "a binary file; a trace is CSV, a log of halscope or Klipper's motion log", source=source
+        )
     if data.lstrip()[:1] == b"{":
         return _of_klipper(data, source)
     lines = data.decode("utf-8", errors="replace").splitlines()
@@ -87,30 +91,23 @@ def read_trace(path: str | Path) -> Trace:
     if first >= len(lines):
         raise InputError("the trace is empty", source=source)
     mark = next((c for c in ";\t," if c in lines[first]), None)
-    if mark is None:  # the older halscope: a name before each number
-        parts = [line.split() for line in lines[first:]]
-        names, rows = parts[0][::2], [part[1::2] for part in parts]
-    else:
-        names, first = lines[first].split(mark), first + 1
-        rows = [line.split(mark) for line in lines[first:]]
-    table = _numbers(rows, len(names), first, source)
+    names = lines[first].split(mark)
+    named = mark is None  # the older halscope has a name before each number
+    names, columns, first = (
+        (names[::2], range(1, len(names), 2), first) if named else (names, None, first + 1)
+    )
+    try:
+        table = np.loadtxt(lines[first:], delimiter=mark, usecols=columns, ndmin=2)
+    except ValueError as fault:
+        row = re.search(r"at row (\d+)", str(fault))
+        line = (
+            first + int(row[1]) + ("changed" not in str(fault)) if row else None
+        )  # which numpy counts from 1
+        raise InputError(re.split(";| at row", str(fault))[0], source=source, line=line) from None
+    if len(table) < LEAST or table.shape[1] != len(names):
+        said = f"{len(table)} samples of {table.shape[1]} numbers and {len(names)} names"
+        raise InputError(f"{said}; at least {LEAST} are needed, with a name for each number", source=source)
     return _of_columns([name.strip().strip('"').lower() for name in names], table, period, source)
-
-
-def _numbers(rows: list[list[str]], wide: int, first: int, source: str) -> FloatArray:
-    """(T, n) the rows as numbers; `first` lines stand before them. An empty row at the end is none."""
-    while rows and not "".join(rows[-1]).strip():
-        rows.pop()
-    for k, row in enumerate(rows):
-        try:
-            if len(row) != wide:
-                raise ValueError(f"{len(row)} columns, and the first line has {wide}")
-            [float(word) for word in row]
-        except ValueError as fault:
-            raise InputError(str(fault), source=source, line=first + k + 1) from None
-    if len(rows) < LEAST:
-        raise InputError(f"{len(rows)} samples; at least {LEAST} are needed", source=source)
-    return np.array(rows, dtype=np.float64)
 
 
 def _of_columns(names: list[str], table: FloatArray, period: re.Match[str] | None, source: str) -> Trace:

@@ -8,7 +8,7 @@
   {
     const passed = summary.verdict && summary.verdict.passed;
     element("subtitle").textContent = `${summary.method} on machine ${summary.machine}` +
-      (summary.tolerance_mm === null ? "" : `, tolerance ${summary.tolerance_mm} mm`) + `; ${summary.blocks.toLocaleString()} blocks`;
+      (summary.tolerance_mm === null ? "" : `, tolerance ${digits(summary.tolerance_mm / about.units.mm)} ${about.units.length}`) + `; ${summary.blocks.toLocaleString()} blocks`;
     element("verdict").textContent = passed ? "passed" : "failed";
     element("verdict").className = passed ? "passed" : "failed";
     // Words and figures are those of the terminal: summary.told. The header has some of them, the table "In words" all.

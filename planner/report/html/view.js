@@ -30,7 +30,10 @@ addEventListener("afterprint", () => recolour(true));
 function pathLayout([scene, wide, high], box) {
   const room = Math.max(box.clientWidth - COLOURBAR, 100), height = Math.max(box.clientHeight, 100);
   const zoom = 2 * FILLED * Math.min(room / height / wide, 1 / high);
-  for (const axis of "xyz") scene[`${axis}axis`].title.text = axis;  // a longer one is cut off at the edge
+  for (const axis of "xyz") {
+    scene[`${axis}axis`].title.text = axis;  // a longer one is cut off at the edge
+    if (box.clientWidth < 500) scene[`${axis}axis`].nticks = 4;
+  }
   const aspectratio = Object.fromEntries(Object.entries(scene.aspectratio).map(([axis, ratio]) => [axis, ratio * zoom]));
   return { ...look, scene: { ...scene, aspectratio }, margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, uirevision: "keep" };
 }

@@ -145,7 +145,7 @@ def _points(points: ArrayLike, axes: str) -> tuple[FloatArray, str]:
         raise InputError(f"axes '{axes}': give each letter once, of x y z a b c u v w")
     wanted = (len(letters),) if axes else (2, 3)
     if given.ndim != 2 or given.shape[1] not in wanted or len(given) < 2:
-        needed = f"(n, {len(letters)})" if axes else "(n, 2) or (n, 3)"
+        needed = f"(n, {len(letters)})" if axes else "(n, 2) or (n, 3), with axes='xyzabc' for more columns,"
         raise InputError(f"points: shape {given.shape}; it must be {needed} with at least two points")
     bad = np.logical_not(np.isfinite(given).all(axis=1))
     _refuse("points: row", bad, given, "every coordinate must be finite")

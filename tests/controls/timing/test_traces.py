@@ -156,12 +156,12 @@ def test_what_is_no_trace(tmp_path: Path) -> None:
         return done.output
 
     good = "".join(f"{k / 1000},0.0\n" for k in range(100))
-    assert "bad.csv:5: could not convert string to float: 'a'" in said("t,x\n0,1\n1,2\n2,3\n3,a\n")
-    assert "bad.csv:3: 3 columns, and the first line has 2" in said("t,x\n0,1\n0,5,1\n")
+    assert "bad.csv:5: could not convert string 'a' to float64" in said("t,x\n0,1\n1,2\n2,3\n3,a\n")
+    assert "bad.csv:3: the number of columns changed from 2 to 3" in said("t,x\n0,1\n0,5,1\n")
     assert "no column of an axis; found are t, load" in said("t,load\n" + good)
     assert "no column t; found are x, y" in said("x,y\n" + good)
     assert "sample 2: times must increase" in said("t,x\n" + "0,0\n" * 40)
-    assert "2 samples; at least 32" in said("t,x\n0,1\n1,2\n")
+    assert "2 samples of 2 numbers and 2 names; at least 32 are needed" in said("t,x\n0,1\n1,2\n")
     assert "nothing moves in this trace" in said("t,x\n" + good)
     assert "no trapq:toolhead" in said('{"q": "status"}')
     assert "no motion log of Klipper" in said("{half")

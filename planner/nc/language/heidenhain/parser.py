@@ -119,6 +119,8 @@ class HeidenhainParser(Definitions):
             raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
         if match is None or read is None:
             why = f" ({_WHY[name]})" if name in _WHY else ""
+            if name[:1] == "G" and name[1:].isdigit() and not why:
+                why = "; a program in G codes is read without --dialect heidenhain"
             raise block.fault(
                 f"{name or block.text[:20]} of the conversational language is not read{why}; {REMEDY}"
             )

@@ -106,9 +106,7 @@ class SplineReader:
         near, far = _offset(state, block, "IJ"), _offset(state, block, "PQ")
         if "I" not in block.value and "J" not in block.value:
             if self._reflected is None or self._reflected[0] != blocks:
-                raise block.fault(
-                    "G5 needs I and J, its first control point from its start, unless a G5 is just before it"
-                )
+                raise block.fault("G5 needs I and J, its first control point from its start, or a G5 before")
             near = self._reflected[1]
         elif not ("I" in block.value and "J" in block.value):
             raise block.fault("G5 needs both I and J, or neither")
@@ -120,9 +118,7 @@ class SplineReader:
         opened, now = self.open, block.g.get("motion")
         if now == NURBS_END:
             if opened is None:
-                raise block.fault(
-                    "G5.3 ends a spline, and none is open; write G5.2 and control points before it", "motion"
-                )
+                raise block.fault("G5.3, and none is open; write G5.2 and points before it", "motion")
             self.open = None
             return _even_knots(opened, block), opened.line
         if opened is None:
@@ -283,7 +279,5 @@ def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
         text = f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve"
         raise block.fault(text, "K")
     if inner.max(initial=-np.inf) == knots[-1]:
-        raise block.fault(
-            f"the last {order} knots must be larger than those before: more break the curve", "K"
-        )
+        raise block.fault(f"the last {order} knots must be larger than those before: more break it", "K")
     return _curve(opened, knots)

@@ -233,7 +233,7 @@ def _slots_on_circle(making: Making, given: Given) -> Iterable[Row]:
     radius, b, sweep = given["Q375"] / 2.0, given["Q219"] / 2.0, math.radians(given["Q248"])
     if not 0.0 < b < radius or not 0.0 < abs(sweep) < 2.0 * math.pi:
         text = (
-            "a slot on a circle has a width above 0 and below the diameter, and an opening below 360 degrees"
+            "a slot on a circle has a width above 0, below the diameter, and opens by less than 360 degrees"
         )
         raise ValueError(text)
     shape, at = ArcSlot(radius, b, math.radians(given["Q376"]), sweep), complex(given["Q216"], given["Q217"])

@@ -155,9 +155,8 @@ class SplineReader:
         first = not opened.points
         if first or block.has("XYZ"):
             if len(opened.knots) > len(opened.points):
-                raise WordFault(
-                    block.first_of("XYZ"), "a control point after a line with a knot only; write it before"
-                )
+                text = "a control point after a line with a knot only; write it before"
+                raise WordFault(block.first_of("XYZ"), text)
             opened.points.append(_control_point(state, block, opened))
             opened.weights.append(_weight(block, "R"))
         elif "R" in block.value:
@@ -165,9 +164,7 @@ class SplineReader:
         if "K" not in block.value:
             raise _fault(block, "a line of G6.2 needs its knot K")
         if opened.knots and block.value["K"] < opened.knots[-1]:
-            raise block.fault(
-                f"knots must not decrease: K{block.value['K']:g} after K{opened.knots[-1]:g}", "K"
-            )
+            raise block.fault(f"knots must not decrease, as to K{block.value['K']:g} here", "K")
         opened.knots.append(block.value["K"])
         if not opened.ended:
             return None
@@ -202,9 +199,8 @@ def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
     if not block.has("XY"):
         raise block.fault(f"{name} needs an end point; write X and Y")
     if not state.absolute and name == "G5.2":
-        raise WordFault(
-            block.first_of("XY"), "control points of G5.2 with G91 are relative to what? write G90 before it"
-        )
+        text = "control points of G5.2 with G91 are relative to what? write G90 before it"
+        raise WordFault(block.first_of("XY"), text)
     return target(state, block)[:3]
 
 
@@ -270,9 +266,7 @@ def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
     _check_count(opened, block.at["K"])
     knots, order = np.array(opened.knots), opened.order
     if knots[order - 1] != knots[0] or knots[-order] != knots[-1] or knots[0] == knots[-1]:
-        raise block.fault(
-            f"the first {order} knots of a spline of order {order} must be equal, and the last {order}", "K"
-        )
+        raise block.fault(f"first {order} knots of order {order} must be equal, and the last {order}", "K")
     inner = knots[order:-order]
     times = np.unique(inner, return_counts=True)[1].max(initial=0)
     if times >= order or inner.min(initial=np.inf) == knots[0]:

@@ -146,9 +146,7 @@ def _round_pocket(making: Making, given: Mapping[str, float], *, turning: int) -
     radius = known.diameter / 2.0 / making.unit if tool and known is not None else 0.0
     first, last = given["I"] - radius, given.get("K", given["I"]) - radius
     if not 0.0 < first <= last or ("K" in given and not given.get("Q", 0.0) > 0.0):
-        raise ValueError(
-            f"{name}: I is more than the tool's radius, K more than I, with Q from circle to circle"
-        )
+        raise ValueError(f"{name}: I is more than the tool's radius, K than I, with Q from circle to circle")
     count = equal_steps(last - first, given["Q"]) if last > first else 0
     sizes = [*(first + n * given["Q"] for n in range(count)), last]
     yield from around(making, _circles(making, given, sizes, turning), feed=False)

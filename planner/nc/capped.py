@@ -53,9 +53,8 @@ def capped(program: Program, caps: FeedCaps | None, text: bytes = b"") -> Progra
     joined = np.append((block[1:] == block[:-1]) & (feed[1:] == feed[:-1]), False)
     parts = _divided(program, block[~joined], share[~joined])
     held, lowest = len(np.unique(block[lower])), float(feed[lower].min(initial=np.inf)) / unit
-    note = f"feed caps of {caps.source} hold on {held:,} blocks" + (
-        f", down to F{lowest:.6g}" if held else ""
-    )
+    down = f", down to F{lowest:.6g}" if held else ""
+    note = f"feed caps of {caps.source} hold on {held:,} blocks{down}"
     return dataclasses.replace(
         parts, feed=feed[~joined], uncapped=program.feed[block[~joined]], notes=(*program.notes, note)
     )

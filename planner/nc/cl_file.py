@@ -174,9 +174,8 @@ class _Records:
             axis = np.array(circle[3:]) / max(float(np.linalg.norm(circle[3:])), _ALONG)
             normal = int(np.abs(axis).argmax())
             if abs(axis[normal]) < 1.0 - _ALONG:
-                raise ValueError(
-                    f"an arc about ({axis[0]:g}, {axis[1]:g}, {axis[2]:g}); arcs lie in X/Y, Z/X or Y/Z"
-                )
+                about = ", ".join(f"{part:g}" for part in axis)
+                raise ValueError(f"an arc about ({about}); arcs lie in X/Y, Z/X or Y/Z")
             centre = np.array(circle[:3]) - self._tip
             code = f"G{19 - normal} G{3 if axis[normal] > 0.0 else 2}"
             code += "".join(f" {'IJK'[k]}{_text(float(centre[k]))}" for k in range(3) if k != normal)

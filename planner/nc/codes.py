@@ -142,6 +142,7 @@ _REFUSED = (
     ((450, 460, 480), "a move that is longer by the offset of a tool is", _STRAIGHT),
     ((470,), "engraving a text (Haas), or a move that is shorter by the offset of a tool (Fanuc), is", _STRAIGHT),
     ((661,), "a macro that each block calls is", "write its calls as G65"),
+    ((1000,), "a change of tools with a move (Brother's G100) is", "write M6, and the move behind it"),
     ((770,), "a bore from below by I is", "write G87 with I J K"),
     ((535,), "a move in coordinates of Mazatrol is", "write G53 or G54"),
     ((2340,), "the tool centre point of Haas is", "write G43.4 H, with [kinematics] in the machine file"),

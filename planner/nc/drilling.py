@@ -77,6 +77,7 @@ class Hole:
     beside: tuple[float, float] = (0.0, 0.0)  # (a, b) offset of G87;  counterbore : c of its K
     counterbore: float = 0.0
     turning: int = 1  # of the spindle, 1 or -1
+    fast: bool = False  # out of the hole it feeds to R only, as on Fanuc's controls
     unit: float = 1.0  # of length [mm]
 
 
@@ -98,7 +99,7 @@ def steps(hole: Hole) -> Iterator[CycleStep]:
     step = {
         "down": CycleStep(Kind.LINE, (a, b, hole.bottom)),
         "back": CycleStep(Kind.LINE, (a, b, hole.clear)),
-        "out": CycleStep(Kind.LINE, (a, b, hole.retract)),
+        "out": CycleStep(Kind.LINE, (a, b, hole.clear if hole.fast else hole.retract)),
         "counterbore": CycleStep(Kind.LINE, (a, b, hole.counterbore)),
         "up": CycleStep(Kind.RAPID, (a, b, hole.retract)),
         "beside": CycleStep(Kind.RAPID, (*aside, hole.clear)),
@@ -114,6 +115,8 @@ def steps(hole: Hole) -> Iterator[CycleStep]:
     for name in _STEPS[hole.code].split():
         if name != "dwell" or hole.dwell or hole.code not in FANUC_DWELLS:
             yield from _pecks(hole) if name == "pecks" else (step[name],)
+        if name == "out" and hole.fast:
+            yield step["up"]
 
 
 def _pecks(hole: Hole) -> Iterator[CycleStep]:
@@ -208,6 +211,7 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
         beside=(words.get("IJK"[a], 0.0), words.get("IJK"[b], 0.0)),
         counterbore=words.get("IJK"[axis], 0.0) + (0.0 if state.absolute else bottom),
         turning=state.spindle.turning,
+        fast=state.fanuc,
         unit=state.unit,
     )
 
@@ -259,9 +263,7 @@ def _say(state: State, block: Block, findings: Findings) -> None:
         text = "the operator retracts the tool after the full stop; the plan has a rapid for it"
         findings.assume(f"{name}: {text}", block.line, word)
     if state.motion == codes.THREADING:
-        text = (
-            "the spindle stops in its place at the bottom, and the tool's way off the wall by Q is left out"
-        )
+        text = "the spindle stops in its place at the bottom, and the way off the wall by Q is left out"
         findings.assume(f"{name}: {text}", block.line, word)
     if state.motion in TAPPING:
         text = "planned with F as its upper limit and full stops at both ends, not at constant feed"

@@ -264,6 +264,8 @@ class Interpreter:
         if not block.foreign:
             self._check_parked(block)
             go_to_switches(self.state, self.table, block, self.findings)
+            if block.homing and self.ignored.printer:  # ends their G92
+                self.saved.homed(["XYZ".index(axis) for axis in block.homing], self.state)
             moves.take_polar(self.state, block)
             self._one_shot(block)
             self.table.keep_origin(self.state)

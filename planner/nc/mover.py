@@ -205,9 +205,7 @@ class Mover:
         elif moves.is_move(state, block):
             self._move(block)
         elif "motion" in block.g and state.motion > 3:
-            raise block.fault(
-                f"G{codes.number(state.motion)} needs an axis word: where it leads to", "motion"
-            )
+            raise block.fault(f"G{codes.number(state.motion)} needs an axis word: where it leads", "motion")
 
     def _move(self, block: Block) -> None:
         state = self.state

@@ -22,9 +22,8 @@ from planner.nc.state import DEGREES, REFUSED_MOTION, State
 # The largest number of a word: lengths beyond 1e9 mm have lost the micrometre in double precision and are
 # certainly a mistake.
 NUMBER_MAX = 1e9
-OFFSET_NUMBER = codes.Assumption(
-    "number{|s} of {an offset|offsets} (D, H) without a code that uses {it|them}", "left out"
-)
+_NUMBER = "number{|s} of {an offset|offsets} (D, H) without a code that uses {it|them}"
+OFFSET_NUMBER = codes.Assumption(_NUMBER, "left out")
 Report = Callable[[int, str], None]
 _CLOSES_IF = "the arc would close if its centre were"
 _TURN = 360.0  # degrees

@@ -143,9 +143,7 @@ def set_data(state: State, block: Block, findings: Findings) -> None:
         state.entering = True
         findings.assume(f"G10 L{kind} to G11 writes data of the control, which are not followed", block.line)
     else:
-        needed = (
-            "G10 needs L1, L10 or L11 to set a tool, or L2 or L20 to set a work system; write one of them"
-        )
+        needed = "G10 needs L1, L10 or L11 to set a tool, or L2 or L20 to set a work system; write one"
         raise block.fault(needed, "L" if kind >= 0 else "one-shot")
 
 

@@ -76,9 +76,7 @@ class Frame:
 class Expansion:
     """Counts of the expansion of a program that computes."""
 
-    dialect: (
-        str  # whose language it is: "linuxcnc", "fanuc", "heidenhain", "siemens"; "klipper" of macros, "apt"
-    )
+    dialect: str  # "linuxcnc", "fanuc", "heidenhain", "siemens"; "klipper" of macros, "apt"
     # subprograms in the order of their first call, and how often each was called
     calls: tuple[tuple[str, int], ...]
     turns: int  # turns of loops, jumps and calls

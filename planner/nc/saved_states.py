@@ -76,6 +76,11 @@ class SavedStates:
                 target[:3] += by
                 _go(target, given.get("move_speed"), state, table, line)
 
+    def homed(self, axes: list[int], state: State) -> None:
+        """What G92 has set of axes ends where they are homed, as Klipper and Marlin have it."""
+        state.g92[axes] = self.shift[axes]
+        state.apply_offsets()
+
     def _restore(self, setting: Setting, back: _Kept, state: State, table: BlockTable, line: int) -> None:
         given = setting.values
         if setting.name == "G61":

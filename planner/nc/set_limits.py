@@ -117,10 +117,8 @@ class LimitsInForce:
     ) -> None:
         if name == SPEEDS:
             per_minute = max(given.values(), default=0.0) >= PER_MINUTE
-            unit_of_time = (
-                "minute, as RepRapFirmware has them" if per_minute else "second, as Marlin has them"
-            )
-            findings.assume(f"speeds of {SPEEDS} are read per {unit_of_time}", line)
+            unit_of = "minute, as RepRapFirmware has them" if per_minute else "second, as Marlin has them"
+            findings.assume(f"speeds of {SPEEDS} are read per {unit_of}", line)
             self._set("velocity", given, unit, SECONDS_PER_MINUTE if per_minute else 1.0)
         elif name in ACCELERATIONS:
             self._set("acceleration", given, unit)

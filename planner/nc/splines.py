@@ -106,9 +106,7 @@ class SplineReader:
         near, far = _offset(state, block, "IJ"), _offset(state, block, "PQ")
         if "I" not in block.value and "J" not in block.value:
             if self._reflected is None or self._reflected[0] != blocks:
-                raise block.fault(
-                    "G5 needs I and J, its first control point from its start, unless a G5 is just before it"
-                )
+                raise block.fault("G5 needs I and J, its first control point from its start, or a G5 before")
             near = self._reflected[1]
         elif not ("I" in block.value and "J" in block.value):
             raise block.fault("G5 needs both I and J, or neither")
@@ -120,9 +118,7 @@ class SplineReader:
         opened, now = self.open, block.g.get("motion")
         if now == NURBS_END:
             if opened is None:
-                raise block.fault(
-                    "G5.3 ends a spline, and none is open; write G5.2 and control points before it", "motion"
-                )
+                raise block.fault("G5.3, and none is open; write G5.2 and points before it", "motion")
             self.open = None
             return _even_knots(opened, block), opened.line
         if opened is None:
@@ -159,9 +155,8 @@ class SplineReader:
         first = not opened.points
         if first or block.has("XYZ"):
             if len(opened.knots) > len(opened.points):
-                raise WordFault(
-                    block.first_of("XYZ"), "a control point after a line with a knot only; write it before"
-                )
+                text = "a control point after a line with a knot only; write it before"
+                raise WordFault(block.first_of("XYZ"), text)
             opened.points.append(_control_point(state, block, opened))
             opened.weights.append(_weight(block, "R"))
         elif "R" in block.value:
@@ -169,9 +164,7 @@ class SplineReader:
         if "K" not in block.value:
             raise _fault(block, "a line of G6.2 needs its knot K")
         if opened.knots and block.value["K"] < opened.knots[-1]:
-            raise block.fault(
-                f"knots must not decrease: K{block.value['K']:g} after K{opened.knots[-1]:g}", "K"
-            )
+            raise block.fault(f"knots must not decrease, as to K{block.value['K']:g} here", "K")
         opened.knots.append(block.value["K"])
         if not opened.ended:
             return None
@@ -206,9 +199,8 @@ def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
     if not block.has("XY"):
         raise block.fault(f"{name} needs an end point; write X and Y")
     if not state.absolute and name == "G5.2":
-        raise WordFault(
-            block.first_of("XY"), "control points of G5.2 with G91 are relative to what? write G90 before it"
-        )
+        text = "control points of G5.2 with G91 are relative to what? write G90 before it"
+        raise WordFault(block.first_of("XY"), text)
     return target(state, block)[:3]
 
 
@@ -274,16 +266,12 @@ def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
     _check_count(opened, block.at["K"])
     knots, order = np.array(opened.knots), opened.order
     if knots[order - 1] != knots[0] or knots[-order] != knots[-1] or knots[0] == knots[-1]:
-        raise block.fault(
-            f"the first {order} knots of a spline of order {order} must be equal, and the last {order}", "K"
-        )
+        raise block.fault(f"first {order} knots of order {order} must be equal, and the last {order}", "K")
     inner = knots[order:-order]
     times = np.unique(inner, return_counts=True)[1].max(initial=0)
     if times >= order or inner.min(initial=np.inf) == knots[0]:
         text = f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve"
         raise block.fault(text, "K")
     if inner.max(initial=-np.inf) == knots[-1]:
-        raise block.fault(
-            f"the last {order} knots must be larger than those before: more break the curve", "K"
-        )
+        raise block.fault(f"the last {order} knots must be larger than those before: more break it", "K")
     return _curve(opened, knots)

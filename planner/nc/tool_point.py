@@ -76,9 +76,7 @@ class ToolPointSwitch:
             return
         length = float(state.tool_offset[2]) or self.chain.data.tool_length
         if now and state.tool_offset[:2].any():
-            text = (
-                "the tool centre point needs a tool on the spindle's axis; this one has an offset in x or y"
-            )
+            text = "the tool centre point needs a tool on the spindle's axis; this has an offset in x or y"
             raise block.fault(text, "tool point" if block.tool_point is not None else "tool length")
         if now != self.on or (now and length != self.switches[-1].length):
             self._move(state, now, length)

@@ -24,6 +24,13 @@ TURNING = {c: {"velocity": 100.0, "acceleration": 1000.0, "jerk": 1e5} for c in 
 MACHINES = {
     "mill": machine_from_dict(ABOUT),
     "four-axis": machine_from_dict(ABOUT | {"axes": ABOUT["axes"] | {"a": TURNING["a"]}}),
+    "five-axis": machine_from_dict(
+        ABOUT
+        | {
+            "axes": ABOUT["axes"] | {"a": TURNING["a"], "c": TURNING["c"]},
+            "kinematics": {"type": "xyzac-trt"},
+        }
+    ),
 }
 SAME = 1e-3  # [mm]; the places have three decimals
 

@@ -203,9 +203,7 @@ def _numbers_one_by_one(data: bytes, start: int, end: int, report: Report) -> li
         match = _NUMBER.match(data, at, end)
         apart = not numbers or data[at - 1 : at] in b", \t\r\n\f\v" or data[at : at + 1] in b"+-"
         if match is None or not apart:
-            report(
-                at, at + 1, "this is no number; write digits, such as -12.5, with commas between the numbers"
-            )
+            report(at, at + 1, "this is no number; write digits, such as -12.5, and commas between numbers")
             return None
         value = float(match.group())
         if abs(value) > NUMBER_MAX:

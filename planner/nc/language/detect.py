@@ -45,7 +45,7 @@ _OF_ANOTHER = re.compile(
 )
 _SIEMENS_CODES = (331, 332, 500, *range(505, 600), 601, 602, 603, 621, *range(641, 646), 700, 710)
 _PROGRAM_HEAD = re.compile(rb"^%_N_(\w+)_(MPF|SPF)\b", re.MULTILINE)
-_BESIDE_UNITS = frozenset(b"NGMS")  # letters of a line in which G70 and G71 are no cycles
+_OF_CYCLES = frozenset(b"PQUWRIJKL")  # letters of a line in which G70 and G71 are cycles
 _SUBPROGRAMS = (".mpf", ".spf")
 # A plotter file starts with one of these instructions and a number, the end of the instruction or the next
 # one. No word of an NC program is a letter followed by a letter. (A semicolon before it may start a comment
@@ -121,7 +121,7 @@ def programs_of(data: bytes) -> dict[str, Archived]:
 def units(words: Words) -> list[int]:
     """The words G70 and G71 that no word of a cycle stands beside: inch and mm, as G20 and G21."""
     found = words.find("G", 70.0, 71.0).tolist()
-    return [word for word in found if set(words.of_rows(words.row(word))[0].tolist()) <= _BESIDE_UNITS]
+    return [word for word in found if not _OF_CYCLES & set(words.of_rows(words.row(word))[0].tolist())]
 
 
 def is_plotter_file(data: bytes, source: str) -> bool:

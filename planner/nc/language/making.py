@@ -24,7 +24,7 @@ ASSUMED = {
     "rapid axes": "rapid moves are straight lines, as with RTLION",
     "spindle position": "positioning the spindle (SPOS) takes no time in this plan",
     "preset": "the datum of cycle 247 is that of the work offset in force: the preset table is the control's",
-    "retraction": "M140 MB MAX leads to machine zero in z: where its travel ends the control knows",
+    "retraction": "MB MAX leads to machine zero in z: where its travel ends the control knows",
     "feed of corners": "F of RND and CHF is not followed: they are cut at F of the path",
     "waits": "waits for other channels and spindles (WAITM, WAITS) take no time",
     "tool offset": "offsets of tools (D) are not added: z is that of the tool's tip",

@@ -104,9 +104,7 @@ class Places(Coordinates):
         along = self.matrix[self.normal].copy()
         along[self.normal] -= 1.0
         if self.tilted or along.any() or self.matrix[:, self.normal].sum() != 1.0 or self.shift[self.normal]:
-            raise ValueError(
-                "a cycle along an axis that the frame scales, mirrors, shifts or tilts is not read"
-            )
+            raise ValueError("a cycle in an axis that a frame scales, mirrors, shifts or tilts is not read")
         self._level = self.place[self.normal] if self._level is None else self._level
         words = [word for word in row.words if word[0] not in AXES and not (word[0] == G and word[1] in code)]
         if not self.absolute:  # R counts from the level before the cycle, the depth from R

@@ -253,9 +253,7 @@ class RowsThrough(Places):
         if waits is None:
             return
         if not waits.modal:
-            text = (
-                f"the rounding or chamfer of line {waits.line} needs a move in the plane before and behind it"
-            )
+            text = f"the rounding or chamfer of line {waits.line} needs a move in the plane before and behind"
             raise ValueError(text)
         first, self._corner, self._coming = waits.first, None, None
         waiting, self._between = self._between, []

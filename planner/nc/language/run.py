@@ -176,9 +176,7 @@ class ProgramRun:
         """Run a procedure; its value, if it has one, is `_value` afterwards."""
         function = self._function(str(name), word)
         if self._depth >= DEPTH_MAX:
-            raise ValueError(
-                f"{DEPTH_MAX} calls are open; a subprogram that calls itself must stop some time"
-            )
+            raise ValueError(f"{DEPTH_MAX} calls are open; a subprogram that calls itself must end some time")
         count, numbered, locals_ = whole(times), self.numbered, self.language.locals
         caller, self._frame = self._frame, self._frame_of(place, str(name))
         self._depth += 1

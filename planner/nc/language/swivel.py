@@ -44,9 +44,7 @@ def siemens(making: Making, given: Mapping[str, float]) -> None:
             "axis (MODE 57 or 27)"
         )
     if round(given.get("p2", 0.0)) % 10 == 1:
-        raise ValueError(
-            "ST 1 of CYCLE800, a plane on top of the one before, is not read; write its angles from the zero"
-        )
+        raise ValueError("ST 1 of CYCLE800, a plane on another one, is not read; write its angles from zero")
     if given.get("p0", 0.0) and len(given) > 1:
         making.assume(RETRACTED)
     matrix = np.eye(3)

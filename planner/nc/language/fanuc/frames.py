@@ -53,9 +53,7 @@ def statements(code: str, words: tree.Words, line: SourceLine) -> tuple[list[tre
             "rotating the coordinate system is by an angle R, else by a setting of the control; write the rotated coordinates out"
         )
     if code == "G68" and own.keys() & set("IJK"):
-        raise line.fault(
-            "G68 with I J K turns about an axis in space, which tilts the plane; write the moves out"
-        )
+        raise line.fault("G68 with I J K turns about an axis in space, and tilts the plane; write moves out")
     return [tree.made(line.place, MAKERS[code], **given)], rest
 
 
@@ -117,9 +115,7 @@ def _frame(making: Making, given: Mapping[str, float], *, code: str) -> None:
 def _tilted(making: Making, given: Mapping[str, float]) -> None:
     """G68.2: the plane, at X Y Z, turned by I about z, J about its x and K about its z. Raises ValueError."""
     if given.get("P", 0.0):
-        raise ValueError(
-            f"G68.2 P{given['P']:g} is another way to write a plane; write its angles I J K (Euler)"
-        )
+        raise ValueError(f"G68.2 P{given['P']:g} is another way to write a plane; write its angles I J K")
     shift, angles = ([given.get(c, 0.0) for c in letters] for letters in ("XYZ", "IJK"))
     swivel.plane(making, swivel.euler(*angles), np.array(shift) * making.unit, swivel.WAYS["STAY"], 0)
 
@@ -146,15 +142,11 @@ def _round_pocket(making: Making, given: Mapping[str, float], *, turning: int) -
     tool = round(given.get("D", 0.0))
     known = making.interpreter.state.tools.get(tool)
     if tool and (known is None or not known.diameter):
-        raise ValueError(
-            f"{name} needs the diameter of tool {tool}; write it into [tools] of the machine file"
-        )
+        raise ValueError(f"{name} needs the diameter of tool {tool}; write it into the machine's [tools]")
     radius = known.diameter / 2.0 / making.unit if tool and known is not None else 0.0
     first, last = given["I"] - radius, given.get("K", given["I"]) - radius
     if not 0.0 < first <= last or ("K" in given and not given.get("Q", 0.0) > 0.0):
-        raise ValueError(
-            f"{name}: I is more than the tool's radius, K more than I, with Q from one circle to the next"
-        )
+        raise ValueError(f"{name}: I is more than the tool's radius, K than I, with Q from circle to circle")
     count = equal_steps(last - first, given["Q"]) if last > first else 0
     sizes = [*(first + n * given["Q"] for n in range(count)), last]
     yield from around(making, _circles(making, given, sizes, turning), feed=False)

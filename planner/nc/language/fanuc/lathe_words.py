@@ -77,9 +77,7 @@ class LatheWords(FanucParser):
     def _words(self, words: tree.Words, assignments: tree.Assignments, line: SourceLine) -> None:
         codes = {word.code for word in words}
         for code in sorted(codes & set(REFUSED)):
-            raise line.fault(
-                f"{code}, {REFUSED[code]} is not read; write the moves out in X and Z, or leave this part out"
-            )
+            raise line.fault(f"{code}, {REFUSED[code]} is not read; write moves in X and Z, or leave it out")
         given = {word.letter: word.value for word in words if word.letter not in "GM"}
         if "G33" in codes and "K" not in given:  # of systems B and C, with its lead as F
             codes = {code.replace("G33", "G32") for code in codes}
@@ -161,9 +159,7 @@ class LatheWords(FanucParser):
             return word._replace(letter=axis, value=here + word.value)
         if letter == "H":
             if word.value != tree.ZERO:
-                raise line.fault(
-                    "H turns the spindle as the axis C, which is not planned; X and Z are", word.at
-                )
+                raise line.fault("H turns the spindle as the axis C, which is not planned; X, Z are", word.at)
             return None
         if code in ("G98", "G99"):
             return word._replace(value=tree.Number(94.0 if code == "G98" else 95.0))

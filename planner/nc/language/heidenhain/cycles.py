@@ -232,9 +232,7 @@ def _slots_on_circle(making: Making, given: Given) -> Iterable[Row]:
         raise ValueError("Q367 of cycle 254 other than 0 is not read; give the centre as Q216 and Q217")
     radius, b, sweep = given["Q375"] / 2.0, given["Q219"] / 2.0, math.radians(given["Q248"])
     if not 0.0 < b < radius or not 0.0 < abs(sweep) < 2.0 * math.pi:
-        text = (
-            "a slot on a circle has a width above 0 and below the diameter, and an opening below 360 degrees"
-        )
+        text = "a slot on a circle has a width above 0, below the diameter, and opens below 360 degrees"
         raise ValueError(text)
     shape, at = ArcSlot(radius, b, math.radians(given["Q376"]), sweep), complex(given["Q216"], given["Q217"])
     for k in range(max(1, equal_steps(given["Q377"], 1.0))):

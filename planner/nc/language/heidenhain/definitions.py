@@ -221,10 +221,14 @@ class Definitions(Flow):
         """Cycle 1: its lines give parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
             return [tree.assign(block.place, (text.variable("cycle"), tree.ONE))]
-        column, match = block.column, block.take(r"\s*(?:SET\s?UP|DIST|DEPTH|PLNGNG|PECKG|DWELL|F)\s*")
+        column, match = (
+            block.column,
+            block.take(r"\s*(?:SET\s?UP|DIST|ABST|DEPTH|TIEFE|PLNGNG|PECKG|ZUSTLG|DWELL|V\.?\s?ZEIT|F)\s*"),
+        )
         if match is None or not 1 <= part <= len(_OLD_PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
-        return [tree.assign(block.place, (text.parameter(_OLD_PECKING[part - 1]), block.value()))]
+        value = tree.op("ABS", block.value())  # older controls had the signs of directions in z
+        return [tree.assign(block.place, (text.parameter(_OLD_PECKING[part - 1]), value))]
 
     def _call_cycle(self, block: text.Block) -> text.Rows:
         if not self.cycles & cycles.CYCLES.keys():
@@ -283,11 +287,7 @@ class Definitions(Flow):
     def _retract(self, block: text.Block, given: text.Items) -> text.Rows:
         """M140: back along the tool's axis by MB, or to machine zero."""
         if given.back is None:
-            rows: text.Rows = [
-                assumed_row(block.place, "retraction"),
-                tree.row(block.place, ("G", 53.0), ("G", ZERO), ("Z", ZERO)),
-            ]
-            return [*rows, text.looked_up(block)]
+            return moves.to_the_top(block)
         way = {"Z": text.POSITION["Z"] + given.back}
         fast = given.feed is None
         return self.moves.straight(block, text.Items(feed=None if given.axes else given.feed, fast=fast), way)

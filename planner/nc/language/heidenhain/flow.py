@@ -81,9 +81,7 @@ class Flow:
             return [tree.made(block.place, makers.refuse(_ALARM))]
         begin, target = block.column, block.take(r"Q([LR]?)(\d+)\s*=\s*")
         if target is None or number not in {**_FN_ONE, **_FN_TWO}:
-            why = FN_REFUSED.get(
-                number, "it is not known here; read are FN 0 to 16, 19, 20, 26, 27, 29, 37 and 38"
-            )
+            why = FN_REFUSED.get(number, "it is not known; read are FN 0 to 16, 19, 20, 26, 27, 29, 37, 38")
             raise block.fault(f"FN {number if match else ''} is not read: {why}", begin)
         q = block.known(int(target[2]), target[1].upper())
         if number in _FN_ONE:

@@ -14,6 +14,7 @@ from functools import partial
 from planner.nc.arcs import IN_PLANE
 from planner.nc.language import makers, swivel, tree
 from planner.nc.language.heidenhain import text
+from planner.nc.language.making import assumed_row
 
 Words = list[tuple[str, tree.Expression]]
 Ends = dict[str, tree.Expression]  # absolute coordinates by axis
@@ -294,11 +295,20 @@ def plane_rows(block: text.Block) -> text.Rows:
     given |= {"way": tree.number(swivel.WAYS[way[1]])}
     if side := re.search(r"\bSEQ\s*([-+])", rest):
         given["side"] = tree.Number(1.0 if side[1] == "+" else -1.0)
+    back = re.search(r"\bMB\s*(MAX)?", rest)
+    if back and not back[1]:
+        raise block.wrong("MB with a length is not read; write L M140 MB before the plane")
     if "RELATIV" in block.function:
         given["relative"] = tree.ONE
     if block.function == "PLANE EULER":
         given |= {name: given.get(name, tree.ZERO) for name in needed}
-    return _tilted(block, given)
+    return [*(to_the_top(block) if back and way[1] != "STAY" else []), *_tilted(block, given)]
+
+
+def to_the_top(block: text.Block) -> text.Rows:
+    """MB MAX: back along the tool's axis, to machine zero."""
+    away = tree.row(block.place, ("G", 53.0), ("G", tree.ZERO), ("Z", tree.ZERO))
+    return [assumed_row(block.place, "retraction"), away, text.looked_up(block)]
 
 
 def working_plane(block: text.Block) -> text.Rows:

@@ -19,7 +19,7 @@ from planner.nc.language.system_variables import PositionVariables, position
 
 _FUNCTION = re.compile(
     r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
-    r"PLANE RESET|RND|CHF|LN|LP|CP|CC|CR|CTP|CT|C|L|"
+    r"PLANE RESET|I?[XYZ](?=[-+]?[\d.Q])|RND|CHF|LN|LP|CP|CC|CR|CTP|CT|C|L|"
     r"Q(?=[LRS]?\d+\s*=)|M(?=\s*\d)|\*|FUNCTION RESET|FUNCTION \w+|TRANS \w+|PLANE \w+|PATTERN DEF|DECLARE STRING|\w+",
     re.IGNORECASE,
 )
@@ -114,6 +114,8 @@ class HeidenhainParser(Definitions):
         block = self.blocks[k]
         match = _FUNCTION.match(block.text)
         name = " ".join(match.group().upper().split()) if match else ""
+        along = name[-1:] in set("XYZ") and name.lstrip("I") == name[-1:]  # an axis alone, without L
+        name = "L" if along else name
         read = _READ.get(name)
         if name in ("RND", "CHF"):
             raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
@@ -124,7 +126,7 @@ class HeidenhainParser(Definitions):
             raise block.fault(
                 f"{name or block.text[:20]} of the conversational language is not read{why}; {REMEDY}"
             )
-        block.function, block.column = name, match.end()
+        block.function, block.column = name, 0 if along else match.end()
         if name not in _MOVES:
             return read(self, block)
         corner = self._corner(k + 1, last)
@@ -230,6 +232,7 @@ class HeidenhainParser(Definitions):
         if block.take(r"\s*PAT\b"):
             return self._at_pattern(block)
         if not block.take(r"\s*POS\b"):
+            block.take(r"\s*M\s*$")  # of older controls
             before, after = self._codes_alone(block)
             return [*before, *self._call_cycle(block), *after]
         given = text.items(block)

@@ -193,9 +193,7 @@ class BlockWords(Places):
             )
         if name in tables.REFUSED and (number is None or reader.peek() == "="):  # C5 alone is the axis C at 5
             raise reader.fault(tables.refusal(name), at - reader.start)
-        spindle = (
-            name[1:] if letter in ("S", "M", "H", "T", "D") and name != letter and number is None else ""
-        )
+        spindle = name[1:] if letter in set("SMHTD") and name != letter and number is None else ""
         if len(letter) != 1 or letter not in _WORDS or (number is None and reader.peek() != "="):
             unknown = tables.OF_CONTROL if name[:1] == "$" else tables.UNKNOWN
             raise reader.fault(f"{name}: {unknown.format(name)}", at - reader.start)

@@ -158,9 +158,7 @@ def _bored(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
 def _deep(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
     less, last, apart = given.get("DAM", 0.0), given.get("DTD", 0.0), _APART / making.unit
     if less < 0.0:
-        raise ValueError(
-            "DAM below 0 of CYCLE83, each infeed a share of the one before, is not read; give their difference"
-        )
+        raise ValueError("DAM below 0 of CYCLE83, infeeds as shares, is not read; give their difference")
     pecks = Pecks(
         max(hole.top - depth_of(given, "FDEP", "FDPR"), _SHORT),
         back=given.get("VRT", 0.0) or apart,

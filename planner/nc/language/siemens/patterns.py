@@ -82,9 +82,7 @@ def _at_places(
     for mask in ("XA", "YA"):
         value = known.get(mask, tree.ZERO)
         if not isinstance(value, tree.Number) or set(f"{value.value:.0f}") - {"0", "1"}:
-            raise ValueError(
-                f"{mask} of CYCLE802, incremental places, is not read; write them absolute (111111111)"
-            )
+            raise ValueError(f"{mask} of CYCLE802, incremental places, is not read; write absolute ones")
     rows: list[tree.Statement] = []
     for k in range(9):
         words = [(axis, known[f"{axis}{k}"]) for axis in "XY" if f"{axis}{k}" in known]

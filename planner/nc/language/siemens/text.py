@@ -280,9 +280,7 @@ class SiemensControl(LineParser):
         if body is not self.lines[last][0] or any(
             isinstance(s, tree.Goto) for s in tree.statements_in(found)
         ):
-            raise reader.fault(
-                f"the lines {first} to {last} jump, or lie in different loops; write them out", 0
-            )
+            raise reader.fault(f"lines {first} to {last} jump, or lie in different loops; write them out", 0)
         return found
 
     def _repeat_lines(

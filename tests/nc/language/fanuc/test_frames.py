@@ -87,7 +87,7 @@ CASES = {
         "G10 L20 P3 X7. Y0 Z0\nG154 P3\nG0 X1.\nG54 X2.\nG112 X3.",
         "G10 L2 P2 X7 Y0 Z0\nG55\nG0 X1\nG54 X2\nG55 X3",
     ),
-    "the spindle starts": ("G84 X5. Z-5. R2.\nG80", "M3\nG84 X5 Z-5 R2 P0\nG80"),
+    "the spindle starts": ("G84 X5. Z-5. R2.\nG80", "M3\nG99 G84 X5 Z-5 R2 P0\nG80\nG0 Z10"),
     "fine boring": ("M3\nG76 X5. Z-5. R2. Q.2 P100\nX9.\nG80", "M3\nG86 X5 Z-5 R2 P.1\nX9\nG80"),
     "tools": ("G10 L12 P1 R3.\nG10 L10 P1 R5.\nG43 H1 Z20.\nG41 D1 G1 X20. Y0\nX20. Y20.\nG40 X0 Y20.",
               "G10 L1 P1 Z5 R3\nG43 H1 G0 Z20\nG41 D1 G1 X20 Y0\nX20 Y20\nG40 X0 Y20"),

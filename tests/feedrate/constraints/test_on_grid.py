@@ -12,7 +12,7 @@ from benchmarks.judge.setpoints import trajectory_of
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.limits import VELOCITY, Limits
-from planner.feedrate.constraints.on_grid import OnGrid, remaining_budget
+from planner.feedrate.constraints.on_grid import OnGrid, interval_sides, remaining_budget
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
 from planner.motion import limits_used
@@ -85,3 +85,16 @@ def test_the_normal_acceleration_of_a_circle_is_told_as_it_is():
     ((order, ratio),) = limits_used.ratios(Limits.of(machine, motion.axes), motion)
     assert order == 2
     assert ratio == pytest.approx(speed**2 / radius / most, rel=1e-9)
+
+
+def test_every_point_has_the_intervals_of_its_own_piece_beside_it():
+    """Interval k is that from point k to point k + 1; none reaches from one piece to the next."""
+    program = parse_program("G21 G61.1 F6000\nG1 X10\nG1 Y10\nG1 X0\n")
+    samples = grid_of(program, problems.machine()).samples
+    pieces = list(zip(samples.piece[:-1], samples.piece[1:], strict=True))
+    assert len(pieces) == 3
+    left, right = interval_sides(samples)
+    for begin, end in pieces:
+        intervals = np.arange(begin, end - 1)
+        assert left[begin:end].tolist() == [begin, *intervals]
+        assert right[begin:end].tolist() == [*intervals, end - 2]

@@ -11,7 +11,8 @@ from benchmarks.jobs import problems
 from benchmarks.judge.setpoints import trajectory_of
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.feedrate.constraints.limits import VELOCITY, Limits
+from planner.feedrate.constraints.assemble import CURVATURE_MARGIN, bounds_of
+from planner.feedrate.constraints.limits import LIMITS, VELOCITY, Limits
 from planner.feedrate.constraints.on_grid import OnGrid, interval_sides, remaining_budget
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
@@ -98,3 +99,12 @@ def test_every_point_has_the_intervals_of_its_own_piece_beside_it():
         intervals = np.arange(begin, end - 1)
         assert left[begin:end].tolist() == [begin, *intervals]
         assert right[begin:end].tolist() == [*intervals, end - 2]
+
+
+def test_caps_from_curvatures_leave_their_margin():
+    """For what the curvatures of points miss between them."""
+    grid = grid_of(parse_program("G21 G17 F60000\nG3 X0 Y0 I-10 J0\n"), problems.machine())
+    (chord,) = (limit for limit in LIMITS if limit.name == "chord_error")
+    caps = [cap.feed_sq for side in grid.sides() for cap in chord.on_side(side, grid.machine)]
+    expected = (1.0 - CURVATURE_MARGIN) * np.min(caps, axis=0)
+    np.testing.assert_allclose(bounds_of(grid.samples, grid.machine, [chord]), expected, rtol=1e-12)

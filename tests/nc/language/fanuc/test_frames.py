@@ -30,6 +30,7 @@ CASES = {
         "G68 X0 Y0 R45.\nG91 G68 X0 Y0 R45.\nG90 G1 X5. Y0\nG69\nX5. Y0",
         "G1 X0 Y5\nX5 Y0",
     ),
+    "the unit said once more": ("G68 X0 Y0 R90.\nG1 X5. Y0\nG21\nX9. Y0\nG69\nX0 Y0", "G1 X0 Y5\nX0 Y9\nX0 Y0"),
     "scale": ("G51 X0 Y0 Z10. P2000\nG1 X5. Y6.\nG2 X9. Y6. I2.\nG50\nG1 X0", "G1 X10 Y12\nG2 X18 Y12 I4\nG1 X0"),
     "a scale of each axis": ("G51 X1. Y0 Z0 I2. J.5 K1.\nG1 X5. Y6.\nG50\nX0", "G1 X9 Y3\nX0"),
     "mirror": (

@@ -30,7 +30,6 @@ CASES = {
         "G68 X0 Y0 R45.\nG91 G68 X0 Y0 R45.\nG90 G1 X5. Y0\nG69\nX5. Y0",
         "G1 X0 Y5\nX5 Y0",
     ),
-    "the unit said once more": ("G68 X0 Y0 R90.\nG1 X5. Y0\nG21\nX9. Y0\nG69\nX0 Y0", "G1 X0 Y5\nX0 Y9\nX0 Y0"),
     "scale": ("G51 X0 Y0 Z10. P2000\nG1 X5. Y6.\nG2 X9. Y6. I2.\nG50\nG1 X0", "G1 X10 Y12\nG2 X18 Y12 I4\nG1 X0"),
     "a scale of each axis": ("G51 X1. Y0 Z0 I2. J.5 K1.\nG1 X5. Y6.\nG50\nX0", "G1 X9 Y3\nX0"),
     "mirror": (
@@ -178,3 +177,11 @@ def test_a_random_frame_is_its_matrix() -> None:
         expected = [pole + turn * (point - pole) for point in scaled]
         ends = (found.end[-5:, 0] - start[0]) + 1j * (found.end[-5:, 1] - start[1])
         assert np.abs(ends - expected).max() < 1e-9
+
+
+def test_the_unit_may_be_said_once_more_while_a_frame_is_in_force_and_not_another() -> None:
+    text = HEAD + "G68 X0 Y0 R90.\nG1 X5. Y0\n{}\nX9. Y0\nG69\nM30"
+    found = parse_program(text.format("G21"), MACHINE)
+    np.testing.assert_allclose(found.end[-1, :2] - found.end[-2, :2], [0, 4], atol=1e-9)
+    with pytest.raises(InputError, match="the unit changes"):
+        parse_program(text.format("G20"), MACHINE)

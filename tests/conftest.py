@@ -20,6 +20,9 @@ settings.register_profile("suite", deadline=None, derandomize=True, print_blob=T
 settings.register_profile("search", deadline=None, print_blob=True)
 settings.load_profile("suite")
 
+LONG = frozenset(
+    (ROOT / "tests" / "long.txt").read_text(encoding="utf-8").splitlines()
+)  # and two lines of remarks
 SLOW = 25  # a slow test takes about as long as so many others
 
 
@@ -28,6 +31,13 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option, "loadscopereorder"
     ):  # pytest-xdist would begin with the files that have the most tests
         config.option.loadscopereorder = False
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m looks
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """The quick subset: neither marked slow nor named in long.txt."""
+    if not item.get_closest_marker("slow") and item.nodeid.partition("[")[0] not in LONG:
+        item.add_marker("quick")
 
 
 @pytest.hookimpl(trylast=True)  # of those that -m has left

@@ -1,4 +1,4 @@
-"""The quick subset, `-m "not slow"`: of the many cases of one test the few that stand for it."""
+"""Of the many cases of one test the few that are not slow and stand for it."""
 
 from __future__ import annotations
 

@@ -30,6 +30,14 @@ def test_files_are_short_and_use_public_names() -> None:
     assert (long, private) == ({}, {})
 
 
+def test_what_is_left_out_of_the_quick_subset_is_there() -> None:
+    names = [line for line in (TESTS / "long.txt").read_text(encoding="utf-8").splitlines() if "::" in line]
+    assert names == sorted(set(names))
+    texts = {file.relative_to(TESTS.parent).as_posix(): file.read_text(encoding="utf-8") for file in FILES}
+    gone = [n for n in names if f"def {n.partition('::')[2]}(" not in texts.get(n.partition("::")[0], "")]
+    assert not gone
+
+
 def test_file_names_are_used_once() -> None:
     """pytest imports test files by their name alone."""
     places = defaultdict(list)

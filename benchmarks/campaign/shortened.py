@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from planner.machine import Axis, Machine
+from planner.machine.parts import MAGNITUDE_MAX
 from planner.nc.program import Program
 
 DWELL_MAX = 0.05  # [s]
@@ -45,7 +46,7 @@ def quicker(program: Program, machine: Machine, by: float) -> tuple[Program, Mac
     if machine.feed_max is not None:
         update["feed_max"] = machine.feed_max * by
     if machine.normal_acceleration is not None:
-        update["normal_acceleration"] = machine.normal_acceleration * by**2
+        update["normal_acceleration"] = min(machine.normal_acceleration * by**2, MAGNITUDE_MAX)
     return dataclasses.replace(program, feed=program.feed * by), machine.model_copy(update=update)
 
 

@@ -86,7 +86,7 @@ class Covered:
         path, own = root / file, set[str]()
         text, seen = path.read_text(encoding="utf-8"), self.lines.get(file, {})
         where, inside = statement(text, line)
-        anywhere = self.digests.get(file) != digest(path) or "@njit" in text
+        anywhere = self.digests.get(file) != digest(path) or "@njit" in text or "@kernel" in text
         anywhere = anywhere or (
             not any(seen.get(at) for at in where) and (not inside or any(at in seen for at in where))
         )

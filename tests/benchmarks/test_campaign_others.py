@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks.campaign.jobs import HALF_DEFAULT_FROM, OTHERS_FROM, Job, job, job_from
 from benchmarks.campaign.others import KINDS, PERIODS
+from planner.machine.parts import MAGNITUDE_MAX
 
 FIRST = range(OTHERS_FROM, OTHERS_FROM + 160)
 
@@ -24,6 +25,7 @@ def test_every_kind_is_drawn_and_all_but_the_tiniest_arcs_can_be_read(jobs: list
         sources[made.source].append(made)
     assert sources.keys() == KINDS.keys()
     assert all(made.program is not None or "the arc" in made.refusal for made in jobs)
+    assert all((made.machine.normal_acceleration or 0.0) <= MAGNITUDE_MAX for made in jobs)
     refused = sum(made.program is None for made in jobs)
     assert refused <= len(jobs) // 20
 

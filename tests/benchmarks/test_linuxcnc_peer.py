@@ -51,12 +51,13 @@ def test_the_pentagon_takes_the_time_that_linuxcnc_itself_takes() -> None:
 
 @needs_linuxcnc
 def test_feeds_that_differ_are_exceeded_where_linuxcnc_itself_exceeds_them() -> None:
-    """Where it blends a slow move with fast ones. In LinuxCNC 2.9 itself the program took 2,053 periods, and had 28.1 times the slowest
-    feed where the planner alone has 27.8: the joints' interpolation is between them."""
+    """Where it blends a slow move with fast ones: it is many times too fast even from where it is nearest to the vertex on, where F
+    changes. In LinuxCNC 2.9 itself the program took 2,053 periods."""
     program = parse_program("G1 X5 F60000\nY1 F30\nX0 F6000\nY0.8 F60\nX0.01 F6000\nX10\nM2\n")
     found = run(program)
     assert found.cycle_s == pytest.approx(2.053, abs=0.01)
-    assert found.verdict.limits["feed"].ratio == pytest.approx(28.1, rel=0.02)
+    assert found.verdict.limits["feed"].ratio > 10.0
+    assert found.verdict.limits["feed"].line == 2
 
 
 @needs_linuxcnc

@@ -11,8 +11,9 @@ from benchmarks.jobs import problems
 from benchmarks.judge.setpoints import trajectory_of
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.feedrate.constraints.limits import VELOCITY, Limits
-from planner.feedrate.constraints.on_grid import OnGrid, remaining_budget
+from planner.feedrate.constraints.assemble import CURVATURE_MARGIN, bounds_of
+from planner.feedrate.constraints.limits import LIMITS, VELOCITY, Limits
+from planner.feedrate.constraints.on_grid import OnGrid, interval_sides, remaining_budget
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
 from planner.motion import limits_used
@@ -85,3 +86,25 @@ def test_the_normal_acceleration_of_a_circle_is_told_as_it_is():
     ((order, ratio),) = limits_used.ratios(Limits.of(machine, motion.axes), motion)
     assert order == 2
     assert ratio == pytest.approx(speed**2 / radius / most, rel=1e-9)
+
+
+def test_every_point_has_the_intervals_of_its_own_piece_beside_it():
+    """Interval k is that from point k to point k + 1; none reaches from one piece to the next."""
+    program = parse_program("G21 G61.1 F6000\nG1 X10\nG1 Y10\nG1 X0\n")
+    samples = grid_of(program, problems.machine()).samples
+    pieces = list(zip(samples.piece[:-1], samples.piece[1:], strict=True))
+    assert len(pieces) == 3
+    left, right = interval_sides(samples)
+    for begin, end in pieces:
+        intervals = np.arange(begin, end - 1)
+        assert left[begin:end].tolist() == [begin, *intervals]
+        assert right[begin:end].tolist() == [*intervals, end - 2]
+
+
+def test_caps_from_curvatures_leave_their_margin():
+    """For what the curvatures of points miss between them."""
+    grid = grid_of(parse_program("G21 G17 F60000\nG3 X0 Y0 I-10 J0\n"), problems.machine())
+    (chord,) = (limit for limit in LIMITS if limit.name == "chord_error")
+    caps = [cap.feed_sq for side in grid.sides() for cap in chord.on_side(side, grid.machine)]
+    expected = (1.0 - CURVATURE_MARGIN) * np.min(caps, axis=0)
+    np.testing.assert_allclose(bounds_of(grid.samples, grid.machine, [chord]), expected, rtol=1e-12)

@@ -90,6 +90,12 @@ def test_types_of_scaling(extra, origin, factor):
     np.testing.assert_allclose(program.end[0, :2], UNIT * (np.array(origin) + np.array([10, 20]) * factor))
 
 
+def test_relative_places_are_in_the_units_of_each_axis():
+    """200 x 50 plotter units are 100 x 100 user units: a step of (10, 20) is one of (20, 10)."""
+    program = parse_program("IP0,0,200,50;SC0,100,0,100;PU10,20;PR10,20;PU10,20", source="x.plt")
+    np.testing.assert_allclose(program.end[:, :2] / UNIT, [(20, 10), (40, 20), (60, 30)])
+
+
 def test_scaling_goes_on_and_off():
     text = "IP0,0,100,100;SC0,1,0,1;PU1,1;IP10,10;PU1,1;SC;PU1,1;SC0,1,0,1;PU1,1;DF;PU1,1;SC0,1,0,1;IN;PU1,1"
     program = parse_program(text, source="x.plt")

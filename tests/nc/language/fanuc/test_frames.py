@@ -177,3 +177,11 @@ def test_a_random_frame_is_its_matrix() -> None:
         expected = [pole + turn * (point - pole) for point in scaled]
         ends = (found.end[-5:, 0] - start[0]) + 1j * (found.end[-5:, 1] - start[1])
         assert np.abs(ends - expected).max() < 1e-9
+
+
+def test_the_unit_may_be_said_once_more_while_a_frame_is_in_force_and_not_another() -> None:
+    text = HEAD + "G68 X0 Y0 R90.\nG1 X5. Y0\n{}\nX9. Y0\nG69\nM30"
+    found = parse_program(text.format("G21"), MACHINE)
+    np.testing.assert_allclose(found.end[-1, :2] - found.end[-2, :2], [0, 4], atol=1e-9)
+    with pytest.raises(InputError, match="the unit changes"):
+        parse_program(text.format("G20"), MACHINE)

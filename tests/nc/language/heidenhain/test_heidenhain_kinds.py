@@ -44,6 +44,11 @@ PLACES: dict[str, tuple[str, list[tuple[float, float, float]]]] = {
     "M97, M109 without compensation": ("L X+1 F100 M97\nL X+2 M98\nL X+3 M109\nL X+4 M110", [(k, 0, 0) for k in range(1, 5)]),
     "cycle 247": ("CYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;DATUM NUMBER\nL X+1 FMAX", [(1, 0, 0)]),
     "tools by parameters": ("Q1=5\nQ2=2000\nTOOL CALL Q1 Z SQ2 F100 DL+0 DR2:+0\nL X+1 F AUTO", [(1, 0, 0)]),
+    "Q, QL and QR beside each other": (
+        "FN 0: Q990 = +1\nFN 0: Q1000 = +1\nFN 0: Q1999 = +1\nQR0 = 2\nQR8 = 2\nQL0 = 3\n"
+        "L X+Q990 Y+Q1000 Z+Q1999 F500\nL X+QR0 Y+QR8 Z+QL0",
+        [(1, 1, 1), (2, 2, 3)],
+    ),
     "QL, QR, QS": ('QL1=5\nQR1 = QL1 + 2\nQS1 = "abc"\nFN 0: QL5 = +3\nL X+QL1 Y+QR1 Z+QL5 F500', [(5, 7, 3)]),
     "SGN, %, SQ": ("Q1 = SGN -5\nQ2 = 7 % 4\nL X+Q1 Y+Q2 Z+0 F100", [(-1, 3, 0)]),
     "functions that move nothing": (

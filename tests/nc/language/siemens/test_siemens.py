@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,7 @@ from planner.nc.reading import Reading
 
 MILL = load_machine("mill")
 REAL = (
-    Path(__file__).resolve().parents[5]
-    / "shared"
+    Path(os.environ.get("PLANNER_SHARED", Path(__file__).resolve().parents[5] / "shared"))
     / "nc"
     / "121philip__SINUMERIK-840D-sl-CAS-Package__CAM_TEST.MPF"
 )

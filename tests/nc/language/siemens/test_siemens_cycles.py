@@ -9,6 +9,7 @@ import pytest
 from moved import is_rapid, machine_with, read_twice, sampled
 
 from planner.base.errors import InputError
+from planner.nc.language.making import coarse_lead
 from planner.nc.program import Kind, Program
 from planner.nc.reading import Reading
 
@@ -153,3 +154,15 @@ def test_the_direction_of_milling(cdir: int, spindle: str, left: int) -> None:
 def test_cycles_that_make_no_sense_or_are_not_known_are_refused(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read(text.replace("G18 ", "G18\n"))
+
+
+@pytest.mark.parametrize(
+    ("lead", "sizes"),
+    [
+        (0.5, [3]), (0.7, [4]), (0.8, [5]), (1.0, [6, 7]), (1.25, [8, 9]), (1.5, [10, 11]), (1.75, [12]), (2.0, [14, 16]),
+        (2.5, [18, 20, 22]), (3.0, [24, 27]), (3.5, [30, 33]), (4.0, [36, 39]), (4.5, [42, 45]), (5.0, [48]),
+    ],
+)  # fmt: skip
+def test_leads_of_coarse_threads_are_those_of_iso_261(lead: float, sizes: list[int]) -> None:
+    assert [coarse_lead(float(size), 1.0) for size in sizes] == [lead] * len(sizes)
+    assert coarse_lead(float(sizes[0]), 25.4) == pytest.approx(lead / 25.4)

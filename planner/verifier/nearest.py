@@ -26,6 +26,7 @@ import math
 
 from planner.base.arrays import FloatArray
 from planner.verifier.kernel import kernel
+from planner.verifier.pieces import PLACE_ROUNDING
 
 PARTS = 32  # of a cubic on which f may have several zeros
 HALVED = 52  # times that a part is halved with a zero in it: to the last digit of x
@@ -131,3 +132,10 @@ def reach_of(
         own = off + h * change / 8.0 + apart * change / max(pace, FEED_AT_REST)
         reach = min(reach, math.sqrt(2.0 * (apart + rounding) * rounding / sharp) + 2.0 * own / sharp)
     return reach
+
+
+@kernel(inline=True)
+def reach_with_rounding(near, ends, chord, acceleration):
+    """`reach_of` on a chord (switches.py), with all rounding [mm]."""
+    own = reach_of(near, ends, chord["cut"], chord["h"], acceleration, chord["error"])
+    return own + chord["error"] + PLACE_ROUNDING

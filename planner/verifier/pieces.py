@@ -190,6 +190,15 @@ def reach_chord(
 
 
 @kernel(inline=True)
+def out_of_reach(pieces: ProgramPieces, first: int, last: int, ends: FloatArray) -> bool:
+    """Whether a chord (2, A) is out of reach of one of the vertices from `first` to `last`."""
+    over = 0.0
+    for i in range(first, last + 1):
+        over = max(over, reach_chord(ends[0], ends[1], pieces, i, 0.0)[2] - pieces.joint[i]["budget"])
+    return over > 0.0
+
+
+@kernel(inline=True)
 def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[float, float, float]:
     """The part of a segment within `radius` of a point whose foot on its line is at the fraction x, off_sq
     away (squared)."""

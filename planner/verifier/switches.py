@@ -4,16 +4,15 @@ The motion is on the blocks in their order, and goes over from one to the next w
 vertex between them; on a straight line that is the vertex. Of several vertices that are within reach of each
 other those places T_i, in order, count that are together nearest to them:
 
-    least  sum_i |x(T_i) - V_i|^2,    T_1 <= T_2 <= ...
+    least  sum_i |x(T_i) - V_i|^2,    T_1 <= T_2 <= ...,    |x(T_i) - V_i| <= eps_i
 
-over the chords of the motion, by dynamic programming over the vertices that each chord can be at
+(as far as there are such places) over the chords of the motion, by dynamic programming over the vertices that each chord can be at
 (matching.py). A vertex is settled once the motion cannot be on the block before it any more. A full stop is
 passed where the motion rests.
 
 Where the motion runs on cubics that is the place on them, known to rounding; where only its samples are known it is the place of
-the chord, and known to a `reach` (nearest.py). So far from the switch a place belongs to both blocks, and the larger F counts. On a
-straight line at 100 mm/s, 4,000 mm/s2 and 1 ms the reach of a chord is 3e-5 mm; where bends are slow, and the tolerance is wide, it
-is micrometres. Of vertices that are nearest out of order within one chord the place together counts.
+the chord, and known to a `reach` (nearest.py). So far from the switch a place belongs to both blocks, and the larger F counts. Of
+vertices that are nearest out of order within one chord the place together counts.
 """
 
 import math
@@ -23,8 +22,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.verifier.kernel import kernel
-from planner.verifier.nearest import nearest, reach_of
-from planner.verifier.pieces import PLACE_ROUNDING, ProgramPieces, reach_chord
+from planner.verifier.nearest import nearest, reach_with_rounding
+from planner.verifier.pieces import PLACE_ROUNDING, ProgramPieces, out_of_reach, reach_chord
 from planner.verifier.worst import ROUNDING_ULPS
 
 # cost: least sum of squared distances up to this vertex, from the first open one on, inf before it is looked
@@ -47,6 +46,8 @@ OPEN, HEAD, TAIL, USED, PASSED, PATIENCE = range(6)
 SURE, TRAVELLED, JUDGED = range(3)  # in `along`: the open vertex is not passed, length run, judged to [mm]
 # Price of a full stop passed where the motion does not rest [budgets]: more than of all vertices around.
 RUN_THROUGH = 1e3
+# How much more a square counts beyond the tolerance of its vertex [-]: what rounding adds there is below other distances.
+OUTSIDE = 1e3
 # How much more firmly the place of a full stop is held than others passed together with it [-].
 FIRM = 1e9
 ROOM = 4096  # chords and marks there is room for at first
@@ -211,7 +212,8 @@ def _look(
         _, _, apart = reach_chord(new.state[k - 1, 0], new.state[k, 0], pieces, i, 0.0)
         if cut >= 0.0 and before + max(apart - bow, 0.0) ** 2 < switch[i]["cost"]:
             apart, _, _, _ = nearest(pieces.vertex[i], new.state[k - 1 : k + 1], cut, h)
-        cost = before + apart * apart
+        outside = max(apart - bow, 0.0) ** 2 - pieces.joint[i]["budget"] ** 2
+        cost = before + apart * apart + OUTSIDE * max(outside, 0.0)
         if pieces.joint[i]["stop"] and (
             step > 4.0 * bow + 2.0 * rounding or apart > bow + rounding + PLACE_ROUNDING
         ):
@@ -277,7 +279,7 @@ def _settle(pieces: ProgramPieces, found: Passing, bounds: Bounds) -> None:
             near = nearest(pieces.vertex[i], found.ends[here], row["cut"], row["h"])
             switch[i]["place"] = max(row["begin"] + near[1] * row["step"], along[SURE])
             if pieces.piece[i - 1]["feed"] != pieces.piece[i]["feed"]:
-                switch[i]["end"] = _reach(near, found.ends[here], row, bounds)
+                switch[i]["end"] = reach_with_rounding(near, found.ends[here], row, bounds.acceleration)
             _pool(pieces, found, first, i, bounds)
         i += 1
     seen = i
@@ -312,18 +314,11 @@ def _keep(found: Passing, first: int, last: int, top: int) -> None:
     state[OPEN], state[HEAD] = last + 1, max(state[HEAD], switch[last]["chord"])
 
 
-@kernel(inline=True)
-def _reach(near, ends, row, bounds):
-    """How far a place is unknown along the motion, with all rounding [mm]."""
-    own = reach_of(near, ends, row["cut"], row["h"], bounds.acceleration, row["error"])
-    return own + row["error"] + PLACE_ROUNDING
-
-
 @kernel()
 def _pool(pieces: ProgramPieces, found: Passing, first: int, i: int, bounds: Bounds) -> None:
     """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed together,
-    where the motion is nearest to the mean of them; of chords that is known to two of them. How well single places are known
-    does not matter on cubics: they are ends of chords where they are out of order."""
+    where the motion is nearest to the mean of them, within reach of all; of chords that is known to two of them.
+    How well single places are known does not matter on cubics: they are ends of chords where they are out of order."""
     switch, state, work, n = found.switch, found.state, found.work, i
     while n > first and switch[n - 1]["chord"] >= 0 and switch[n]["place"] <= switch[n - 1]["place"]:
         n -= switch[n - 1]["group"]
@@ -335,15 +330,19 @@ def _pool(pieces: ProgramPieces, found: Passing, first: int, i: int, bounds: Bou
                 before = work[axis] if m > n else 0.0
                 work[axis] = before + (pieces.vertex[m, axis] - before) * firm / weight
         near = nearest(work, found.ends[here], found.chord[here]["cut"], found.chord[here]["h"])
+        edge = 0.0
         for way in (-1, 1):
             while state[HEAD] <= here + way < state[TAIL]:
                 row = found.chord[here + way]
                 other = nearest(work, found.ends[here + way], row["cut"], row["h"])
                 if other[0] >= near[0]:
                     break
+                if out_of_reach(pieces, n, i, found.ends[here + way, :, 0]):
+                    edge = row["step"]
+                    break
                 here, near = here + way, other
         row = found.chord[here]
-        own = _reach(near, found.ends[here], row, bounds)
+        own = reach_with_rounding(near, found.ends[here], row, bounds.acceleration) + edge
         if math.isnan(row["cut"]):
             own = max(reach, 2.0 * row["step"])
         for m in range(n, i + 1):

@@ -139,6 +139,19 @@ def test_vertices_passed_together_are_passed_at_the_nearest_place_to_all(seed):
     assert {fault.name for fault in wrong.faults} == {"feed"}
 
 
+@pytest.mark.parametrize(("feeds", "way"), [((2, 40), -1), ((40, 2), 1)])
+def test_vertices_passed_together_are_passed_within_reach_of_each(feeds, way):
+    """Of x = 9.9 and 9.1 the middle is nearest to both, and the second one, 0.54 mm beside the motion, is out of reach there."""
+    m = machine(dt=0.0005, tolerance=0.6, acceleration=A)
+    moves = Moves().line(9.9, feed=feeds[0]).line(9.1, 0.54, feed=feeds[0]).line(20, 0, feed=feeds[1])
+    edge = 9.1 + np.sqrt(0.6**2 - 0.54**2)
+    for shift, keeps in ((0.0, True), (20 * way * TOO_SOON, False), (-20 * way * TOO_SOON, True)):
+        motion = Straight(feeds, (edge + shift, 20.0))
+        samples = sample((motion.end, motion), m.dt)
+        seen = verify(samples, moves.toolpath(m), m, motion=motion, not_limited=("jerk",))
+        assert {fault.name for fault in seen.faults} == (set() if keeps else {"feed"})
+
+
 def in_order(places):
     """Non-decreasing numbers, of which the squares of the differences from `places` have the least sum."""
     runs = []

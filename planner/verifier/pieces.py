@@ -191,7 +191,7 @@ def reach_chord(
 
 @kernel(inline=True)
 def out_of_reach(pieces: ProgramPieces, first: int, last: int, ends: FloatArray) -> bool:
-    """Whether a chord (2, A) is out of reach of one of the vertices from `first` to `last`."""
+    """Whether the chord between `ends` (2, A) is out of reach of one of the vertices from `first` to `last`."""
     over = 0.0
     for i in range(first, last + 1):
         over = max(over, reach_chord(ends[0], ends[1], pieces, i, 0.0)[2] - pieces.joint[i]["budget"])

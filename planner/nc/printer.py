@@ -26,6 +26,11 @@ from planner.nc.moves import Block
 _COUNTS = (82.0, 83.0)
 _SETS = (104.0, 106.0, 109.0, 140.0, 141.0, 190.0, 191.0, 201.0, 202.0, 203.0, 204.0, 220.0, 221.0)
 _NUMBERS = b"SRXYZE"  # letters of such numbers
+_PATH_MODES = (
+    61.0,
+    61.1,
+    64.0,
+)  # G codes of mills, of which printers have G61 alone: back to what G60 has kept
 _CODE = r"[GMTP]\s*-?\d+(?:\.\d+)?(?![\d.])"
 _NAME = r"@[\w-]+|[A-Za-z]*_\w+(?=\s|$)|[A-Za-z]{2}[A-Za-z\d]*(?=\s+[A-Za-z]\w*\s*=)"
 _COMMAND = re.compile(rf"\s*(?:N\s*\d+\s*)?({_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T)", re.IGNORECASE)
@@ -95,13 +100,15 @@ def command_of(text: str) -> Command | None:
     return Command(name, text[match.end() :].strip())
 
 
-def is_printer(words: Words) -> bool:
+def is_printer(words: Words, *, extruder: bool) -> bool:
     """True for a program of a 3-D printer: of none that has a number or changes tools (M6), where M83 and M109
-    are others."""
+    are others. On a machine with an extruder it needs no other mark, but G61 without G60 and G64 are of mills."""
     begin = words.first[:-1]
     numbers = (words.letter[begin] == ord("O")) & (words.value[begin] >= 0.0)
     if numbers.any() or len(words.find("M", 6.0)):
         return False
+    if extruder and not (len(words.find("G", *_PATH_MODES)) and not len(words.find("G", 60.0))):
+        return True
     of_sets = [words.of_rows(row)[0].tolist() for row in words.rows_with(words.find("M", *_SETS))]
     sets = (
         ord("G") not in letters and letters.count(ord("M")) == 1 and set(letters) & set(_NUMBERS)

@@ -169,7 +169,8 @@ def execute(
     calls = called is not None and called.dialect == KLIPPER
     prints = calls or language == PRINTER
     if language != SIEMENS and not reading.strict:
-        prints |= is_printer(words) or (machine is not None and EXTRUDER in machine.axes)
+        extruder = reading.dialect == AUTO and machine is not None and EXTRUDER in machine.axes
+        prints |= is_printer(words, extruder=extruder)
     if prints:
         interpreter.ignored.read_printer()
     if language != SIEMENS and not reading.strict and (units := detect.units(words)):

@@ -96,12 +96,13 @@ def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether there is no plan yet, or the motion on the path takes less time, as far as it is known, or may
-    behind long filters."""
+    """Whether there is no plan yet, or the motion on the path takes less time, as far as it is known and the
+    search was for the least, or may behind long filters."""
     if filters_count(*job.real):
         return True
     before = tried.began if tried.path is None else tried.path[1].end
-    return tried.best is None or before < (1.0 - SAME_TIME) * counted_time(tried.best)
+    sooner = before < (1.0 - SAME_TIME) * counted_time(tried.best)
+    return tried.best is None or (sooner and not settings.effort.search.smooth)
 
 
 def _on_path(job: Job, settings: Settings, tried: Tried) -> Tried:

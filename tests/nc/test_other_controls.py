@@ -221,3 +221,19 @@ def test_the_dialect_of_printers_holds_where_no_word_tells_it() -> None:
     assert float(program.dwell.sum()) == pytest.approx(0.5)
     computed = parse_program("#1 = 7\nG1 X#1 F600\n", reading=Reading(dialect="marlin"))
     assert computed.end[-1, 0] == 7.0
+
+
+@pytest.mark.parametrize(
+    ("text", "dialect", "dwell"),
+    [
+        ("G1 X1 F600\nG4 P500\n", "auto", 0.5),
+        ("G64 P0.01\nG1 X1 F600\nG4 P5\n", "auto", 5.0),
+        ("G61\nG1 X1 F600\nG4 P5\n", "auto", 5.0),
+        ("G1 X1 F600\nG4 P5\n", "linuxcnc", 5.0),
+    ],
+)
+def test_on_a_machine_with_an_extruder_a_mills_program_is_a_mills(
+    text: str, dialect: str, dwell: float
+) -> None:
+    program = parse_program(text, load_machine("ender3"), Reading(dialect=dialect))
+    assert float(program.dwell.sum()) == pytest.approx(dwell)

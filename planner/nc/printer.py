@@ -21,6 +21,7 @@ from planner.nc.extruder import Retraction
 from planner.nc.faults import IgnoredWords
 from planner.nc.lexer import FAULT, Words
 from planner.nc.moves import Block
+from planner.nc.unreadable import META
 
 # M codes that only printers have, and those that only printers have with a number on a line of their own.
 _COUNTS = (82.0, 83.0)
@@ -28,7 +29,9 @@ _SETS = (104.0, 106.0, 109.0, 140.0, 141.0, 190.0, 191.0, 201.0, 202.0, 203.0, 2
 _NUMBERS = b"SRXYZE"  # letters of such numbers
 _CODE = r"[GMTP]\s*-?\d+(?:\.\d+)?(?![\d.])"
 _NAME = r"@[\w-]+|[A-Za-z]*_\w+(?=\s|$)|[A-Za-z]{2}[A-Za-z\d]*(?=\s+[A-Za-z]\w*\s*=)"
-_COMMAND = re.compile(rf"\s*(?:N\s*\d+\s*)?({_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T)", re.IGNORECASE)
+_COMMAND = re.compile(
+    rf"\s*(?:N\s*\d+\s*)?(?!(?:{META})\b)({_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T)", re.IGNORECASE
+)
 _EXTENDED = re.compile(rf"\s*(?:{_NAME})", re.IGNORECASE)
 _KEY = re.compile(r"([A-Za-z]\w*)\s*=\s*(\"[^\"]*\"|\S*)")
 _LETTER = re.compile(r"([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+)|)")

@@ -109,8 +109,7 @@ class Reading:
     @property
     def names(self) -> list[str]:
         """Words and commands that are left out before words are split; those of printers (PRINT_START) are not."""
-        kinds = _CODE, _OTHER, _LINES
-        return [entry for entry in self.ignore if not any(kind.fullmatch(entry) for kind in kinds)]
+        return [name for name in self.ignore if _NAME.fullmatch(name) and not _OTHER.fullmatch(name)]
 
     def kept(self, data: bytes, source: str) -> tuple[bytes, list[tuple[int, str]]]:
         """A program with blanks for the lines and words that are left out, and those with their line; offsets
@@ -161,16 +160,13 @@ def _without(name: str, rows: list[bytes], source: str) -> list[int]:
     spelled = r"[ \t]*".join(map(re.escape, re.findall(r"\d+|[A-Z_$]+", name)))
     own = r"(?:[ \t]*(?:\[[^\]]*\]|\([^)]*\)))*(?:[ \t]*=(?!=)[ \t]*[^\s;]+)?"
     word = re.compile(rf'(?i)([^;("]*?(?<![\w$.]))(?:{spelled})(?!\w)({own})')
-    found, goes_on = [], False
+    found = []
     for k, row in enumerate(rows):
         text = row.decode("latin-1")
-        if goes_on:
-            text, goes_on = " " * len(text), text.rstrip().endswith("~")
         while match := word.match(text):
             end = match.end()
             if not match[2] and re.fullmatch(r"\s*(?:/\d?)?\s*N?\d*\s*", match[1], re.IGNORECASE):
                 end = len(text.partition(";")[0].rstrip("\r"))
-                goes_on = text[:end].rstrip().endswith("~")
                 if beside := _COORDINATES.search(text, match.end(), end):
                     what = f"ignore: {name} stands beside {beside[0]}, which may move; write it on a line of its own"
                     raise InputError(what, source=source, line=k + 1, column=len(match[1]) + 1)

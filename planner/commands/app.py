@@ -85,6 +85,7 @@ def _plain(fault: Any, options: list[str]) -> None:
     wrong = getattr(fault, "option_name", None)
     if getattr(fault, "possibilities", None) and wrong:
         near = difflib.get_close_matches(wrong, options, n=1, cutoff=NEAR)
+        near = ["--vary NAME=RANGE"] if wrong == "--set" and "--vary" in options else near
         fault.message = f"no option {wrong}" + (f"; did you mean {near[0]}?" if near else "")
         fault.possibilities = None
     if type(fault).__name__ == "MissingParameter" and not fault.message:

@@ -185,7 +185,7 @@ _READING: dict[str, tuple[Any, Any]] = {
         typer.Option(
             "--ignore",
             metavar="CODE,...",
-            help="leave out what you know to be harmless: codes, axes, commands, lines, such as M428,G187,A,$X,12-20",
+            help="leave out what you know to be harmless: codes, axes, words, lines, such as M428,G187,A,$X,12-20",
         ),
     ),
     **{

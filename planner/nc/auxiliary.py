@@ -8,6 +8,7 @@ radius; an arc has that of its largest.
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -42,11 +43,11 @@ _LONG = 60.0  # a dwell of a minute is no usual one [s]
 TURNING = {30: 1, 40: -1, 50: 0}  # of the spindle, by ten times M3, M4 and M5
 
 
-def set_feed(state: State, block: Block, findings: Findings) -> None:
-    """The feed mode and F of a block; F0 is no feed for what follows. Raises WordFault for a negative F."""
+def set_feed(state: State, block: Block, findings: Findings, column: Callable[[int], int]) -> None:
+    """The feed mode and F of a block; F0, at the column of its word, is no feed for what follows. Raises WordFault for a negative F."""
     mode = _MODES[block.g["feed mode"]] if "feed mode" in block.g else state.feed_mode
     if mode != state.feed_mode:
-        state.feed_mode, state.feed, state.feed_per_turn = mode, 0.0, 0.0
+        state.feed_mode, state.feed, state.feed_per_turn, state.feed_zero = mode, 0.0, 0.0, ""
     if "F" not in block.value:
         return
     feed = block.value["F"]
@@ -55,6 +56,7 @@ def set_feed(state: State, block: Block, findings: Findings) -> None:
         raise block.fault(text, "F")
     if mode == "inverse time":
         return
+    state.feed_zero = "" if feed else f" (F0 in line {block.line}, column {column(block.at['F'])}, is none)"
     state.feed_unit = state.unit
     if mode == "per minute":
         state.feed = feed * state.unit / SECONDS_PER_MINUTE * state.feed_factor
@@ -79,7 +81,7 @@ def take_default(
         return
     state.feed, state.feed_unit = default * state.feed_factor, state.unit
     feed = default * SECONDS_PER_MINUTE / state.unit
-    findings.assume(f"no feed before the first feed move: {whose}, F{feed:g}", block.line)
+    findings.assume(f"no feed before the first feed move{state.feed_zero}: {whose}, F{feed:g}", block.line)
 
 
 def check_feed(state: State, block: Block) -> None:
@@ -102,7 +104,7 @@ def check_feed(state: State, block: Block) -> None:
         state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE
     if not state.feed > 0:
         remedy = "write an F word on this line or before it, or feed_default into the machine file"
-        raise WordFault(word, f"{name} moves without a feed; {remedy}")
+        raise WordFault(word, f"{name} moves without a feed{state.feed_zero}; {remedy}")
 
 
 def on_surface(state: State) -> bool:

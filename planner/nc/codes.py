@@ -90,7 +90,8 @@ CHARACTERS: dict[str, str] = {
     "<": "named parameters are not supported; write the number out",
     "$": "this command to the control is not supported: it may move ($J does); write what it moves as G0 or G1",
     "=": "assignments are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
-    '"': "texts are not part of RS274NGC (is this a Siemens program?); choose an RS274NGC post-processor",
+    '"': "texts (messages, questions of Centroid's and EdingCNC's; a Siemens program has them too) are not part of RS274NGC; "
+    "write a message as a comment, an answer as its number, or choose an RS274NGC post-processor",
     "/": "block delete is allowed at the start of a line only",
     ")": "a comment is closed that was not opened",
     ",": "corner roundings and chamfers (,R and ,C) are not supported: write the arc or the line; a decimal comma is written as a "
@@ -153,8 +154,11 @@ _REFUSED = (
     ((500,), "presetting coordinates with G50 is", "write G92"),
     ((510,), "scaling is", "write the scaled coordinates out"),
     ((680, 690), "rotating the coordinate system is", "write the rotated coordinates out"),
-    ((721, 722), "a copy of a subprogram (Fanuc), or a lathe cycle (LinuxCNC), is", _STRAIGHT),
-    ((700, 710, 711, 712, 720), "a lathe cycle is", _STRAIGHT),
+    ((700, 710, 711, 712, 720, 721, 722), "a lathe cycle whose contour is a subprogram (LinuxCNC: Q and its O number) is",
+     "write the contour as blocks with N numbers and call it by P and Q, as Fanuc's lathes (G71 P10 Q20 U0.4 W0.1 D1), or "
+     "write the moves out as G0, G1, G2 and G3"),
+    ((929,), "setting the place of the motors, whatever offsets are in force (Marlin, Prusa), is",
+     "write G92 where the coordinates are meant"),
 )
 # fmt: on
 G_REFUSED = {code: Refusal(what, remedy, code != 510) for given, what, remedy in _REFUSED for code in given}

@@ -254,7 +254,8 @@ class Interpreter:
                 self.limits.take(setting, self.state, self.table, block.line, self.findings)
         mover.check_offsets(self.state, block, compensated=self.mover.cutter is not None)
         self.state.numbers |= {c: block.value[c] for c in block.value.keys() & {"D", "H"}}
-        auxiliary.set_feed(self.state, block, self.findings)
+        assert self._words is not None
+        auxiliary.set_feed(self.state, block, self.findings, self._words.column)
         self._timed |= self.state.feed_mode == "inverse time"
         auxiliary.events(self.state, self.table, block, self.findings)
         if block.g.get("one-shot") == 40:

@@ -21,6 +21,7 @@ from planner.nc.extruder import Retraction
 from planner.nc.faults import IgnoredWords
 from planner.nc.lexer import FAULT, Words
 from planner.nc.moves import Block
+from planner.nc.unreadable import META
 
 # M codes that only printers have, and those that only printers have with a number on a line of their own.
 _COUNTS = (82.0, 83.0)
@@ -33,7 +34,9 @@ _PATH_MODES = (
 )  # G codes of mills, of which printers have G61 alone: back to what G60 has kept
 _CODE = r"[GMTP]\s*-?\d+(?:\.\d+)?(?![\d.])"
 _NAME = r"@[\w-]+|[A-Za-z]*_\w+(?=\s|$)|[A-Za-z]{2}[A-Za-z\d]*(?=\s+[A-Za-z]\w*\s*=)"
-_COMMAND = re.compile(rf"\s*(?:N\s*\d+\s*)?({_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T)", re.IGNORECASE)
+_COMMAND = re.compile(
+    rf"\s*(?:N\s*\d+\s*)?(?!(?:{META})\b)({_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T)", re.IGNORECASE
+)
 _EXTENDED = re.compile(rf"\s*(?:{_NAME})", re.IGNORECASE)
 _KEY = re.compile(r"([A-Za-z]\w*)\s*=\s*(\"[^\"]*\"|\S*)")
 _LETTER = re.compile(r"([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+)|)")

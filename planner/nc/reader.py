@@ -123,6 +123,9 @@ def interpret(
             )
             notes, assumptions = (note, *as_absolute.notes), (note, *as_absolute.assumptions)
             return dataclasses.replace(as_absolute, notes=notes, assumptions=assumptions), found
+    if faults and reading.dialect not in (AUTO, HEIDENHAIN) and detect.language_of(data):
+        text = f"{faults[0].message} (the program looks like Heidenhain's: leave --dialect out, or write heidenhain)"
+        faults = [dataclasses.replace(faults[0], message=text), *faults[1:]]
     return program, faults
 
 
@@ -138,9 +141,9 @@ def execute(
     tee : gets the expanded rows of a program that computes, chunk by chunk
     """
     interpreter = Interpreter(machine, source, reading)
-    data = reading.kept(data, source)
-    for first, last in reading.lines:
-        interpreter.findings.assume(f"lines {first} to {last} are left out, as --ignore says", first)
+    data, left = reading.kept(data, source)
+    for line, what in left:
+        interpreter.findings.assume(f"{what} left out, as --ignore says", line)
     interpreter.archive = detect.programs_of(data)
     mains = (one.text() for name, one in interpreter.archive.items() if name.endswith("mpf"))
     data = next(mains, data)

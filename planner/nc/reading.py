@@ -32,10 +32,20 @@ DIALECTS = (AUTO, LINUXCNC, FANUC, HEIDENHAIN, SIEMENS, PRINTER, *_ALIASES)
 _CODE = re.compile(r"([GM])(\d{1,4})(?:\.(\d))?")
 _OTHER = re.compile(r"[ABCUVW]|\$[A-Z$#]?|[A-Z]*_\w+")
 _LINES = re.compile(r"(\d+)(?:-(\d+))?")
+_NAME = re.compile(r"[A-Z$][A-Z_$]\w*(?: \w+)*")
+# Words and commands that move, set coordinates or decide what comes next, by their beginning.
+_MOVES = re.compile(
+    r"(?:L[PN]|C[CPRT]|CTP|CIP|RND|CHF|APPR|DEP|F(?:LT?|CT?|POL|SELECT)|LBL|CALL|TOOL|CYCL|PLANE|PATTERN|BEGIN|END|"
+    r"FUNCTION (?:TCPM|RESET)|FN ?(?!1[4-79])\d+|A?(?:TRANS|ROTS?|SCALE|MIRROR)|CROTS|TRA\w+|TO(?:FRAME|ROT)\w*|PAROT|SUPA|DIAM\w+|"
+    r"[ABC]?SPLINE|POLY|INVC?CW|KONT|OFFN|ANG|AR|AP|RP|CH[RF]|RNDM|TURN|GEOAX|CYCLE(?!832)\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|POS[AP]?|MOV|DEF|PROC|RET|CASE|MCALL|"
+    r"(?:EL|ELSE|END)?IF|ELSE|(?:END)?(?:WHILE|FOR|LOOP|SUB)|REPEATB?|UNTIL|GO(?:TO[BFC]?|SUB)|DO|SET|VAR|GLOBAL|EXTCALL|PCALL)\b"
+)
+_COORDINATES = re.compile(r"(?i)(?<!\w)I?[XYZABCUVW](?:[-+]?[\d.]+|[-+]?Q\d+|\s*=)")
 _WRITTEN: dict[type, type] = {tuple: list, FeedCaps: str}  # settings in JSON
+_WHY = "it moves the axes, or what follows it has another meaning without it"
 _SAY = (
-    "write G and M codes, rotary or second axes (A B C U V W), commands of the control ($X, PRINT_START) or lines "
-    "(12-20), such as M428,G187,A,12-20"
+    "write G and M codes, rotary or second axes (A B C U V W), words and commands of the control ($X, PRINT_START, WMAT, ACC) "
+    "that move nothing or lines (12-20), such as M428,G187,A,12-20"
 )
 
 
@@ -46,7 +56,7 @@ class Reading:
 
     strict       : refuse everything that would be assumed
     ignore       : what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands
-                   ("$X", "PRINT_START"), lines of the file ("12-20"); in one normal form
+                   and words ("$X", "PRINT_START", "ACC"), lines of the file ("12-20"); in one normal form
     arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute",
                    or "auto", which is incremental unless arcs on more than one line close with absolute
                    centres only, as all of the program do
@@ -96,16 +106,24 @@ class Reading:
         found = filter(None, map(_LINES.fullmatch, self.ignore))
         return [(int(lines[1]), int(lines[2] or lines[1])) for lines in found]
 
-    def kept(self, data: bytes, source: str) -> bytes:
-        """A program with blanks for the lines that are left out; offsets stay. Raises InputError for lines
-        beyond its end."""
-        rows = data.split(b"\n") if self.lines else []
+    @property
+    def names(self) -> list[str]:
+        """Words and commands that are left out before words are split; those of printers (PRINT_START) are not."""
+        return [name for name in self.ignore if _NAME.fullmatch(name) and not _OTHER.fullmatch(name)]
+
+    def kept(self, data: bytes, source: str) -> tuple[bytes, list[tuple[int, str]]]:
+        """A program with blanks for the lines and words that are left out, and those with their line; offsets
+        stay. Raises InputError for lines beyond its end, and for a command beside coordinates."""
+        rows = data.split(b"\n") if self.ignore else []
         count = len(rows) - (rows[-1:] == [b""])
         for first, last in self.lines:
             if not 1 <= first <= last <= count:
                 raise InputError(f"ignore: {first}-{last}: the program has lines 1 to {count}", source=source)
             rows[first - 1 : last] = [b" " * len(row) for row in rows[first - 1 : last]]
-        return b"\n".join(rows) if rows else data
+        left = [(first, f"lines {first} to {last} are") for first, last in self.lines]
+        for name in self.names:
+            left += [(line, f"{name} is") for line in _without(name, rows, source)]
+        return (b"\n".join(rows) if rows else data), left
 
     def changed(self) -> dict[str, Any]:
         """The settings that are not the usual ones, ready for JSON; `Reading.saved` reads them, all but feed caps."""
@@ -136,6 +154,28 @@ def ignore_list(text: str) -> tuple[str, ...]:
     return Reading(ignore=tuple(part for part in text.split(",") if part.strip())).ignore
 
 
+def _without(name: str, rows: list[bytes], source: str) -> list[int]:
+    """Put blanks for a word with its brackets and value, or for a command with all behind it; its lines.
+    Raises InputError for one with coordinates behind it."""
+    spelled = r"[ \t]*".join(map(re.escape, re.findall(r"\d+|[A-Z_$]+", name)))
+    own = r"(?:[ \t]*(?:\[[^\]]*\]|\([^)]*\)))*(?:[ \t]*=(?!=)[ \t]*[^\s;]+)?"
+    word = re.compile(rf'(?i)([^;("]*?(?<![\w$.]))(?:{spelled})(?!\w)({own})')
+    found = []
+    for k, row in enumerate(rows):
+        text = row.decode("latin-1")
+        while match := word.match(text):
+            end = match.end()
+            if not match[2] and re.fullmatch(r"\s*(?:/\d?)?\s*N?\d*\s*", match[1], re.IGNORECASE):
+                end = len(text.partition(";")[0].rstrip("\r"))
+                if beside := _COORDINATES.search(text, match.end(), end):
+                    what = f"ignore: {name} stands beside {beside[0]}, which may move; write it on a line of its own"
+                    raise InputError(what, source=source, line=k + 1, column=len(match[1]) + 1)
+            text = match[1] + " " * (end - len(match[1])) + text[end:]
+            found.append(k + 1)
+        rows[k] = text.encode("latin-1")
+    return found
+
+
 def _normal(entry: str) -> str:
     """The one way to write an entry: "m007" is "M7"."""
     text = "".join(entry.upper().split())
@@ -143,12 +183,14 @@ def _normal(entry: str) -> str:
         letter, whole, tenth = match.groups()
         name = f"{letter}{int(whole)}" + (f".{tenth}" if tenth and tenth != "0" else "")
         if not may_be_ignored(name):
-            raise InputError(
-                f"ignore: {name} cannot be left out: it moves the axes, or what follows it has another meaning without it"
-            )
+            raise InputError(f"ignore: {name} cannot be left out: {_WHY}")
         return name
     if _OTHER.fullmatch(text) or _LINES.fullmatch(text):
         return text
+    if _MOVES.match(name := " ".join(entry.upper().split())):
+        raise InputError(f"ignore: {name} cannot be left out: {_WHY}")
+    if _NAME.fullmatch(name):
+        return name
     raise InputError(f"ignore: '{entry}' is nothing that can be ignored; {_SAY}")
 
 

@@ -26,18 +26,28 @@ _CAPITALS = dict(
 # A number with a letter among its digits, and the digits that are meant.
 _LETTERS = re.compile(r"[A-Za-z][ \t]*[-+]?[\d.]*([OolI])[\d.]*(?![A-Za-z_=(])")
 _DIGITS = {"O": "0", "o": "0", "l": "1", "I": "1"}
+# Words of RepRapFirmware's language, most of them EdingCNC's and Centroid's too; a printer has no commands of such names.
+META = "IF|ELIF|ELSE|WHILE|BREAK|CONTINUE|ABORT|VAR|GLOBAL|SET|INPUT"
 # How lines begin, whose they are, and what to do.
 # fmt: off
 _NAMES = (
-    (r"(?:GOSUB|(?:END)?SUB|(?:END)?IF|(?:END)?WHILE|ELSE)\b",
+    (r"(?:GOSUB|(?:END)?SUB|END(?:IF|WHILE))\b",
      "a subprogram or branch of EdingCNC's is not supported; write it as LinuxCNC has it, such as o100 sub and o100 call"),
+    (rf"(?:{META})\b(?![ \t]*\[[^=]*\][ \t]*GOTO)",
+     "a variable, branch or loop of RepRapFirmware's, EdingCNC's or Centroid's, which the control works out as it goes, is not "
+     "supported; write out the lines that it executes, or what it says as LinuxCNC has it, such as o100 if [#1 EQ 3]"),
     (r"(?:CALL|RTS|MODIN|MODOUT|NLAP|NOEX)\b|V[A-Z]*\d*\s*=|N[A-Z]+\d*\b",
      "a word of Okuma's (OSP) is not supported; write the moves out, or post the program for a Fanuc control"),
     (r"(?:RECV|SEND|ECHO|ERROR|OK)\b",
-     "a line of what a terminal has recorded is no part of a program; give the program alone"),
+     "a line of what a terminal has recorded, or a message of RepRapFirmware's, is no part of a program; leave it out"),
     (r"(?:FORCE_MOVE|MANUAL_STEPPER)\b",
      "a motor that turns by itself is not supported; write G1, or --ignore MANUAL_STEPPER where it is none of the axes"),
     (r"[A-Z_]{2}", "a word is a letter and a number; a name is none of RS274NGC"),
+)
+_IN_LINES = (
+    (r"==|!=|&&|\|\|", "a sign in expressions of EdingCNC's, Centroid's or RepRapFirmware's; write EQ, NE, AND or OR"),
+    (r'"', CHARACTERS['"']),
+    (r"\{", "an expression in braces, of RepRapFirmware's, is worked out by the control as it goes; write its value"),
 )
 _CENTROID = ("an M code of Centroid's with / moves until an input changes, waits for it or sets a home, as only the machine knows; "
              "plan the parts before and after it")
@@ -95,12 +105,27 @@ def unreadable(words: Words, word: int) -> str:
     return CHARACTERS.get(text[:1]) or look_alike(text) or _NO_WORD
 
 
+def of_another(text: str) -> tuple[int, str] | None:
+    """Where a line has what RS274NGC's expressions and Fanuc's have not, and what is said of it; None for none."""
+    text = re.sub(r"\([^()]*\)|;.*", lambda found: " " * len(found[0]), text)
+    begin = re.match(rf"\s*(?:N\d+\s*)?(?=(?:{META})\b(?!\s*\[))", text, re.IGNORECASE)
+    if begin is not None:
+        return begin.end(), _without_number(text[begin.end() :], "")
+    found = ((match.start(), what) for sign, what in _IN_LINES if (match := re.search(sign, text)))
+    return next(found, None)
+
+
 def _without_number(text: str, behind: str) -> str:
     """What is said of a letter without a number, at the start of a text, and the character behind it."""
     if letter := _LETTERS.match(text):
         return f"{letter[0].strip()} has the letter {letter[1]} in its number; write the digit {_DIGITS[letter[1]]}"
     known = next((what for name, what in _NAMES if re.match(name, text, re.IGNORECASE)), "")
-    known = known or (CHARACTERS.get(behind, "") if behind not in (")", "/") else "") or look_alike(behind)
+    known = (
+        known
+        or (_IN_LINES[-1][1] if behind == "{" else "")
+        or (CHARACTERS.get(behind, "") if behind not in (")", "/") else "")
+        or look_alike(behind)
+    )
     return known or "a letter without a number; write digits after it, such as X1.5"
 
 

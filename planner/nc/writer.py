@@ -51,7 +51,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
         raise ValueError(f"retimed: a feed of {np.nanmin(new_feed):g} mm/s; none may be negative")
     new_feed = np.where(alone, np.nan, new_feed)
     reading = program.reading
-    source = reading.kept(source, program.source)
+    source = reading.kept(source, program.source)[0]
     words = split_words(without_leader(source, reading)[0], block_delete=reading.block_delete)
     in_source, line = _SourceRows(words), program.line[moving]
     row = np.searchsorted(words.line, line)

@@ -20,6 +20,7 @@ import os
 import re
 import shutil
 import sys
+import tempfile
 import uuid
 from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
@@ -147,6 +148,8 @@ def check_output(directory: Path, names: Iterable[str], *, force: bool = False) 
         there = missing[0].parent if missing else directory
         if not os.access(there, os.W_OK):
             raise InputError(f"cannot be written: no permission to write in {there}", source=str(directory))
+        if missing:  # whether one can be made there (not below /proc)
+            os.rmdir(tempfile.mkdtemp(dir=there))
         _refuse_foreign(directory, names, _vouched(directory), force)
 
 

@@ -19,6 +19,7 @@ JOB = "G21 F3000\nG1 X10\nY5\n"
         (["pln"], "No such command 'pln'. Did you mean 'plan'?"),
         (["machine", "sho"], "No such command 'sho'. Did you mean 'show'?"),
         (["plan", "part.nc", "--tolerence", "0.02"], "no option --tolerence; did you mean --tolerance?"),
+        (["sweep", "part.nc", "--set", "y.jerk=4"], "no option --set; did you mean --vary NAME=RANGE?"),
         (["plan", "part.nc", "--threads", "x"], "Invalid value for '--threads': give a whole number"),
         (["plan", "part.nc", "--threads", "0"], "Invalid value for '--threads': must be 1 or more"),
         (["export", "out", "--for", "fanuc", "-o", "x"], "'fanuc' is not one of"),

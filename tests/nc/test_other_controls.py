@@ -119,6 +119,11 @@ REFUSED = [
     ("M100/1", 5, "Centroid"), ("M115/Z-2 P1 F10", 5, "Centroid"), ("M105/X P1", 5, "Centroid"), ("M7.1", 1, "M7.1"),
     ("M100.1 ({x:n})", 1, "M100.1"), ("M225 #100 \"depth\"", 11, ""), ("M120 \"a.txt\"", 6, "texts"), ("G12 I5", 1, "G12"),
     ("G70 Q100", 1, "lathe cycle"), ("G71 Q100 D1", 1, "lathe cycle"), ("[ESP400]", 1, "starts neither"),
+    ("IF [#1 == 3]", 8, "write EQ"), ("#1=[1 != 2]", 7, "write EQ"), ("IF #1 == 3 THEN #2=1", 1, "Centroid's"),
+    ("INPUT \"a\" #1", 1, "EdingCNC's"),
+    ("var x = 3", 1, "RepRapFirmware's"), ("if a == 3", 1, "RepRapFirmware's"), ("set global.x=3", 1, "RepRapFirmware's"),
+    ("G1 X{var.x}", 4, "braces"), ("{move.axes[0]}", 1, "braces"), ("G92.9 X3", 1, "Marlin"), ("M225 #1 \"a\"", 9, "Centroid's"),
+    ("G72 Q100 D1", 1, "LinuxCNC: Q"), ("o100 if [#1 == 3]", 13, "EdingCNC's"),
     ("Recv: ok", 1, "terminal"), ("echo: busy", 1, "terminal"), ("@ pause", 1, "without a number"),
     # look-alikes: the character, what it is and what to write
     ("G1 XO Y1", 4, "digit 0"),

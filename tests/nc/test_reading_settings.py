@@ -29,7 +29,24 @@ def test_the_list_of_ignored_codes_has_one_form() -> None:
     assert ignore_list(" m007,M 428,G12.1,,a,$h,M7,print_start, 3-5,7") == (
         *("M7", "M428", "G12.1", "A", "$H", "PRINT_START", "3-5", "7"),
     )
-    for wrong in ("X", "M", "G1", "G81", "G5.2", "M30", "M98", "M2", "G20", "F100", "hello", "3-", "M1.23"):
+    for wrong in (
+        "X",
+        "M",
+        "G1",
+        "G81",
+        "G5.2",
+        "M30",
+        "M98",
+        "M2",
+        "G20",
+        "F100",
+        "TRANS",
+        "FN 18",
+        "LP",
+        "if",
+        "3-",
+        "M1.23",
+    ):
         with pytest.raises(InputError, match="ignore"):
             ignore_list(wrong)
 
@@ -124,3 +141,47 @@ def test_a_centre_of_zero_along_the_axis_is_none() -> None:
 def test_a_loop_that_only_switches_something_ends_with_a_sentence() -> None:
     with pytest.raises(InputError, match="lines executed without a move"):
         parse_program("o1 while [1]\nM9\no1 endwhile")
+
+
+# A line of a Sinumerik's or a conversational program that is refused, what is left out of it, and what stays.
+LEFT_OUT = [
+    ("WMAT", "wmat", ""), ("N5 WMAT(1, 2) ; WMAT", "WMAT", ""), ("MY_SUB(3)", "MY_SUB", ""), ("X12 WMAT", "WMAT", "X12"),
+    ("G1 ACC[X]=50 X12 ACC[Y]=20", "ACC", "G1 X12"), ("XYZZY=3 X15", "XYZZY", "X15"), ('MSG("FOO")\nFOO\r', "FOO", ""),
+    ("12 SQL Q1", "SQL", ""), ("FN17: SYSWRITE ID 5 = 3", "FN 17", ""),
+]  # fmt: skip
+SINUMERIK = "DEF REAL A\nG90 G54 G17 G71\nG0 X0 Y0\nG1 X10 F500\n{}\nX20\nM30\n"
+CONVERSATIONAL = "BEGIN PGM A MM\nL X+0 Y+0 Z+10 FMAX\nL X+10 F500\n{}\nL X+20\nEND PGM A MM\n"
+
+
+@pytest.mark.parametrize(("line", "name", "stays"), LEFT_OUT)
+def test_words_that_move_nothing_are_left_out_before_words_are_split(
+    line: str, name: str, stays: str
+) -> None:
+    frame = CONVERSATIONAL if line[:2] in ("12", "FN") else SINUMERIK
+    reading = Reading(ignore=(name,))
+    with pytest.raises(InputError):
+        parse_program(frame.format(line))
+    program = parse_program(frame.format(line), reading=reading)
+    assert program.end.tolist() == parse_program(frame.format(stays)).end.tolist()
+    assert any("--ignore says" in note for note in program.notes)
+
+
+def test_what_moves_is_not_left_out_with_a_word() -> None:
+    for name in ("TRAORI", "CYCL DEF 200", "CYCLE81", "FUNCTION TCPM", "TRANSMIT", "GOTOF"):
+        with pytest.raises(InputError, match="cannot be left out: it moves"):
+            Reading(ignore=(name,))
+    with pytest.raises(InputError, match=r"FOO stands beside X10, .* line of its own") as caught:
+        parse_program(SINUMERIK.format("N5 FOO X10"), reading=Reading(ignore=("FOO",)))
+    assert (caught.value.line, caught.value.column) == (5, 4)
+
+
+def test_a_feed_of_zero_is_named_where_no_feed_is() -> None:
+    with pytest.raises(InputError, match=r"without a feed \(F0 in line 2, column 4, is none\)"):
+        parse_program("G21\nG0 F0\nG1 X10\n")
+    with pytest.raises(InputError, match="without a feed;"):
+        parse_program("G21\nG0 F0\nG93\nG94\nF20\nG95\nG94\nG1 X10\n")
+
+
+def test_a_conversational_program_is_known_under_another_dialect() -> None:
+    with pytest.raises(InputError, match=r"looks like Heidenhain's: leave --dialect out"):
+        parse_program(CONVERSATIONAL.format(""), reading=Reading(dialect="fanuc"))

@@ -278,3 +278,14 @@ def test_places_that_cannot_be_written(tmp_path: Path) -> None:
     with replacing_file(tmp_path / name) as new:
         new.write_text("1")
     assert (tmp_path / name).read_text() == "1"
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no /proc here")
+def test_a_directory_that_cannot_be_made_is_told_before_planning() -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        check_output(Path("/proc/none/plan"), ())
+
+
+def test_a_check_leaves_nothing_behind(tmp_path: Path) -> None:
+    check_output(tmp_path / "a" / "b", ())
+    assert not list(tmp_path.iterdir())

@@ -145,7 +145,7 @@ class Source:
 def rows_of(data: bytes, program: Program, machine: Machine | None) -> Source:
     """The rows of a text that reads as `program` on a machine."""
     reading = program.reading
-    read = without_leader(reading.kept(data, program.source), reading)[0]
+    read = without_leader(reading.kept(data, program.source)[0], reading)[0]
     words = split_words(read, block_delete=reading.block_delete)
     applied = integers_of(machine).applied(words)
     rows = _rows(words, applied, program)

@@ -141,7 +141,7 @@ def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> 
         (_SLASH.search(text) and not linuxcnc, "lines begin with /, which this control does not leave out"),
         (not control.paren and _PAREN.search(text), "it has comments in parentheses"),
         (program.reading.ignore and not linuxcnc, "words were left out by --ignore"),
-        (program.reading.lines, "lines were left out by --ignore"),
+        (program.reading.lines or program.reading.names, "lines or words were left out by --ignore"),
         (without_leader(text, program.reading)[1], "there is text before the first %"),
         (not control.number and _NUMBER.search(text), "its lines have numbers"),
     ):

@@ -92,6 +92,7 @@ class _Files:
         source.at_tip, source.skips = interpreter.ignored.at_tip, interpreter.reading.block_delete
         if interpreter.machine is not None and interpreter.machine.dialect is not None:
             source.harmless = frozenset(map(str.upper, interpreter.machine.dialect.subprograms))
+        source.harmless |= frozenset(interpreter.reading.ignore)
         self.sources.append(source)
         if source.file:
             self.run.files.append(name)

@@ -16,6 +16,7 @@ from planner.nc.integers import LENGTHS
 from planner.nc.language import tree
 from planner.nc.language.source import SourceLine
 from planner.nc.language.tokens import Token, TokenReader
+from planner.nc.unreadable import of_another
 
 _NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:(?:e[-+]\d|E[-+]\d\d)\d*(?![\d.]))?"
 _PIECE = re.compile(r"\((?P<inner>[^()]*)\)|;(?P<rest>.*)|(?P<open>\()|(?P<kept>[^ \t\r\x1a(;]+)", re.DOTALL)
@@ -61,6 +62,7 @@ class LineReader(TokenReader):
         return self._fault(at + 1 + inner.index("("), message)
 
     def _fault(self, column: int, message: str) -> tree.ProgramFault:
+        column, message = of_another(self.line.text) or (column, message)
         return tree.ProgramFault(self.line.place._replace(at=self.line.start + column), message)
 
     def fault(self, message: str, at: int | None = None) -> tree.ProgramFault:

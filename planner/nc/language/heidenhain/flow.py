@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from planner.nc.language import makers, tree
 from planner.nc.language.heidenhain.text import Block, Formula, Rows, variable
 from planner.nc.language.making import assumed_row
+from planner.nc.language.system_variables import position
 from planner.nc.state import NAMED
 
 _COMPARE = {"EQU": "EQ", "NE": "NE", "GT": "GT", "LT": "LT"}
@@ -13,12 +14,13 @@ _FN_IF = {9: "EQU", 10: "NE", 11: "GT", 12: "LT"}
 _FN_TWO = {1: "+", 2: "-", 3: "*", 4: "/", 8: "LEN", 13: "ATAN"}
 _FN_ONE = {0: "", 5: "SQRT", 6: "SIN", 7: "COS"}
 # Functions that move nothing: printing, formatted output, the PLC, waiting for it, tables, texts.
-FN_NOTHING, _FN_WAIT, _FN_ERROR = (15, 16, 19, 20, 26, 27, 29, 37, 38), 20, 14
+FN_NOTHING, _FN_WAIT, _FN_ERROR, _FN_READ = (15, 16, 19, 20, 26, 27, 29, 37, 38), 20, 14, 18
+_PLAIN_IF = "IF is followed by a value, EQU, NE, GT or LT, a value and GOTO LBL: IF +Q1 EQU +2 GOTO LBL 5"
 _ALARM = "the program raises its error (FN 14) here; run it with values that do not lead there"
 _CONTROLS = "the value is known by the control only; assign what it has there: Q1 = 5"
 FN_REFUSED = {
-    18: _CONTROLS,
-    28: _CONTROLS,
+    18: f"{_CONTROLS} (SYSREAD of the position, ID270 NR1 IDX1 to 3, is read)",
+    28: f"{_CONTROLS} (TABREAD reads a table at the control)",
     17: "it writes data of the control; leave it out, if these move nothing",
 }
 
@@ -79,12 +81,19 @@ class Flow:
             return [assumed_row(block.place, "waits")] if number == _FN_WAIT else []
         if number == _FN_ERROR:
             return [tree.made(block.place, makers.refuse(_ALARM))]
-        begin, target = block.column, block.take(r"Q([LR]?)(\d+)\s*=\s*")
-        if target is None or number not in {**_FN_ONE, **_FN_TWO}:
+        begin = block.column
+        asked = number == _FN_READ and block.take(
+            r"SYSREAD\s*(?=Q[LR]?\d+\s*=\s*ID\s*270\s+NR\s*1\s+IDX\s*[1-3]\s*$)"
+        )
+        target = block.take(r"Q([LR]?)(\d+)\s*=\s*")
+        axis = block.take(r".*IDX\s*([1-3])") if asked else None
+        if target is None or (number not in {**_FN_ONE, **_FN_TWO} and axis is None):
             why = FN_REFUSED.get(number, "it is not known; read are FN 0 to 16, 19, 20, 26, 27, 29, 37, 38")
             raise block.fault(f"FN {number if match else ''} is not read: {why}", begin)
         q = block.known(int(target[2]), target[1].upper())
-        if number in _FN_ONE:
+        if axis is not None:
+            operation: tree.Expression = position("XYZ"[int(axis[1]) - 1])
+        elif number in _FN_ONE:
             block.take(r"(?:SQRT|SIN|COS)\s*")
             given = block.value()
             operation = tree.op(_FN_ONE[number], given) if _FN_ONE[number] else given
@@ -96,17 +105,21 @@ class Flow:
         block.end()
         return [tree.assign(block.place, (q, operation))]
 
-    def _jump(self, block: Block, number: int) -> Rows:
+    def _jump(self, block: Block, number: int = 0) -> Rows:
+        """FN 9 to 12; IF without FN compares as it says (`number` 0)."""
         block.take(r"\s*IF\b\s*|\s*IF(?=[-+Q\d.])")
-        left, begin = block.value(), block.column
+        left = block.value()
+        block.take(" *")
+        begin = block.column
         compare = block.take(r"\s*(EQU|NE|GT|LT)\b")
-        if compare is None or compare[1].upper() != _FN_IF[number]:
-            raise block.fault(f"FN {number} compares with {_FN_IF[number]}", begin)
+        if compare is None or compare[1].upper() != _FN_IF.get(number, compare[1].upper()):
+            what = f"FN {number} compares with {_FN_IF[number]}" if number else _PLAIN_IF
+            raise block.fault(what, begin)
         right = block.value()
         if not block.take(r"\s*GOTO\s+LBL\s*"):
             raise block.wrong("GOTO LBL is expected here")
         go: Rows = [tree.Goto(block.place, tree.Number(float(self._label(block))))]
-        return [tree.If(block.place, ((tree.op(_COMPARE[_FN_IF[number]], left, right), go),), [])]
+        return [tree.If(block.place, ((tree.op(_COMPARE[compare[1].upper()], left, right), go),), [])]
 
 
 def procedure_name(label: int, file: int = 0) -> str:

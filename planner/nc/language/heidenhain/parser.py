@@ -18,7 +18,7 @@ from planner.nc.language.source import Source
 from planner.nc.language.system_variables import PositionVariables, position
 
 _FUNCTION = re.compile(
-    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|STOP|"
+    r"BEGIN PGM|END PGM|BLK FORM|TOOL CALL|TOOL DEF|CALL LBL|CALL PGM|CYCLE? DEF|CYCL CALL|LBL|APPR|DEP|FN|IF(?=[-+Q\d.]|\b)|STOP|"
     r"PLANE RESET|I?[XYZ](?=[-+]?[\d.Q])|RND|CHF|LN|LP|CP|CC|CR|CTP|CT|C|L|"
     r"Q(?=[LRS]?\d+\s*=)|M(?=\s*\d)|\*|FUNCTION RESET|FUNCTION \w+|TRANS \w+|PLANE \w+|PATTERN DEF|DECLARE STRING|\w+",
     re.IGNORECASE,
@@ -301,6 +301,7 @@ _READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
     "CALL PGM": HeidenhainParser._call_program,
     "Q": HeidenhainParser._parameter,
     "FN": HeidenhainParser._fn,
+    "IF": HeidenhainParser._jump,
     **dict.fromkeys(("CYCL DEF", "CYCLE DEF"), HeidenhainParser._define),
     "CYCL CALL": HeidenhainParser._cycle_call,
     "STOP": HeidenhainParser._stop,

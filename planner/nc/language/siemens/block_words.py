@@ -59,7 +59,7 @@ class BlockWords(Places):
                 self._text_value(reader)
             elif reader.peek() in ("[", "=") and (target := reader.parameter(token)):
                 reader.expect("=")
-                row.assigned.append((target, reader.expression()))
+                row.assigned += self._assigned(reader, token.text, target)
             else:
                 for word in self._word(reader, name, at):
                     self._take(reader, row, word)

@@ -223,7 +223,8 @@ class Commands(Declarations):
         if name in self.source.harmless:
             self.body.append(
                 tree.Message(
-                    reader.place, (f"{name} is assumed not to move anything, as the machine file says",)
+                    reader.place,
+                    (f"{name} is assumed not to move anything, as the machine file or --ignore says",),
                 )
             )
             return

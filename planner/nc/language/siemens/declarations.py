@@ -1,6 +1,8 @@
 """Variables of a Sinumerik program and of its subprograms: DEF, PROC, what a call hands over and what it gets back."""
 
+import math
 import re
+from collections.abc import Sequence
 
 from planner.nc.language import tree
 from planner.nc.language.siemens.text import (
@@ -72,8 +74,10 @@ class Declarations(SiemensControl):
         first = FIRST_ARRAY + self.source.file * ARRAY_VALUES + self.array_values
         self.array_values += count
         self.names[name] = first, tuple(round(size) for size in sizes)
-        values = self._values(reader, count) if reader.take("=") else [tree.ZERO] * count
-        pairs = ((tree.Numbered(tree.Number(float(first + k))), value) for k, value in enumerate(values))
+        places = [tree.numbered(first + k) for k in range(count)]
+        pairs: tree.Assignments = tuple((one, tree.ZERO) for one in places)
+        if reader.take("="):
+            pairs += tuple(self._assigned(reader, name, places[0], ("SET", "REP", "(")))
         self.body.append(tree.assign(reader.place, *pairs))
 
     def _sizes(self, reader: LineTokens) -> list[float]:
@@ -88,15 +92,24 @@ class Declarations(SiemensControl):
             reader.expect("]")
         return found
 
-    def _values(self, reader: LineTokens, count: int) -> list[tree.Expression]:
-        """The first values of an array: SET(a, b, ...), also without SET, REP(a), or one for the first place."""
-        repeated = reader.peek() == "REP"
-        if repeated or reader.peek() in ("SET", "("):
-            reader.next += reader.peek() != "("
-            given = [tree.ZERO if one is None else one for one in self._arguments(reader)]
-        else:
-            given = [reader.expression()]
-        return given[:1] * count if repeated else (given + [tree.ZERO] * count)[:count]
+    def _assigned(
+        self, reader: LineTokens, name: str, target: tree.Parameter, kinds: Sequence[str] = ("SET", "REP")
+    ) -> list[tuple[tree.Parameter, tree.Expression]]:
+        """What is given to a variable; SET(a, b, ...) and REP(a) give values to an array from a place on, and
+        brackets alone where it is defined (`kinds`)."""
+        kind, (first, sizes) = reader.peek(), self.names.get(name, (0, ()))
+        if kind not in kinds or kind in self.names or not first:
+            return [(target, reader.expression())]
+        assert isinstance(target, tree.Numbered)
+        if (at := _constant(target.index)) is None:
+            raise reader.fault(f"{kind} begins at a place that is a number here: {name}[0]={kind}(...)", 0)
+        left = first + math.prod(sizes) - round(at)
+        reader.next += kind != "("
+        given = [tree.ZERO if one is None else one for one in self._arguments(reader)]
+        if not 0 < len(given) <= left:
+            raise reader.fault(f"{kind} gives {len(given)} values; {name} has {left} from there on", 0)
+        values = given[:1] * left if kind == "REP" else given
+        return [(tree.Numbered(tree.Number(at + k)), value) for k, value in enumerate(values)]
 
     def _text_value(self, reader: LineTokens) -> None:
         """Go past a text; what the control computes of texts moves nothing."""
@@ -152,6 +165,18 @@ class Declarations(SiemensControl):
         if self.handed_back:
             self.body.append(tree.assign(reader.place, *self.handed_back))
         self.body.append(tree.Return(reader.place))
+
+
+def _constant(index: tree.Expression) -> float | None:
+    """The place of a value in an array that is written in numbers; None for one that is computed."""
+    if isinstance(index, tree.Number):
+        return index.value
+    if not isinstance(index, tree.Operation) or index.name not in ("+", "*", "INDEX"):
+        return None
+    left, right = map(_constant, index.operands)
+    if left is None or right is None:
+        return None
+    return {"+": left + right, "*": left * right, "INDEX": left}[index.name]
 
 
 def changed(number: int) -> tree.Named:

@@ -170,11 +170,22 @@ def test_rotary_axes_go_the_shortest_way_under_m126() -> None:
         ("M128", r"needs a table \[kinematics\]"),
         ("L X+1 F9 M92", "write M91"),
         ("CYCL CALL PAT", "no PATTERN DEF"),
+        ("IF Q1 == 1 THEN", "IF is followed by a value, EQU"),
+        ("FN 18: SYSREAD Q1 = ID210 NR1", "known by the control only.*ID270"),
+        ("FN 28: TABREAD Q1 = 2", "TABREAD reads a table"),
     ],
 )
 def test_what_is_refused_says_what_it_would_do(body: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read(body)
+
+
+def test_if_without_fn_jumps_as_fn_9_to_12_do_and_sysread_knows_the_place() -> None:
+    for number, word in ((9, "EQU"), (10, "NE"), (11, "GT"), (12, "LT")):
+        text = "Q1 = 3\nQ2 = 4\n{}IF +Q1 " + word + " +Q2 GOTO LBL 5\nL X+7 F100\nLBL 5\nL Y+8 F100"
+        assert ends(read(text.format(""))).tolist() == ends(read(text.format(f"FN {number}: "))).tolist()
+    text = "L X+7 Y+2 F100\nFN 18: SYSREAD Q5 = ID270 NR1 IDX1\nL Y+Q5"
+    assert ends(read(text))[-1, :2].tolist() == [7.0, 7.0]
 
 
 def test_a_tool_with_a_name_is_called_so() -> None:

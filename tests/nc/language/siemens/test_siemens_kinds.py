@@ -221,3 +221,17 @@ def test_programs_of_an_archive_keep_their_lines_and_share_its_bytes() -> None:
         own = one.text().splitlines()
         assert own[3 * k + 1 : 3 * k + 3] == lines[3 * k + 1 : 3 * k + 3]
         assert not b"".join(own[: 3 * k + 1]).strip()
+
+
+def test_set_and_rep_give_values_to_an_array_from_a_place_on() -> None:
+    frame = "DEF REAL A[4]=SET(1,2,3,4), B[2]=SET(8,9)\n{}\nG71 G0 X=A[0] Y=A[1]\nX=A[2] Y=A[3]\nX=B[0] Y=B[1]\nM30"
+    for line, values in (
+        ("A[1]=SET(7,5)", [1, 7, 5, 4]),
+        ("A[2]=REP(6)", [1, 2, 6, 6]),
+        ("A[0]=REP(0) B[0]=3 A[3]=SET(2)", [0, 0, 0, 2]),
+    ):
+        found = parse_program(frame.format(line)).end[:2, :2].ravel()
+        assert found.tolist() == values
+    for line, said in (("A[3]=SET(1,2)", "A has 1 from there on"), ("A[R1]=SET(1)", "is a number here")):
+        with pytest.raises(InputError, match=said):
+            parse_program(frame.format(line))

@@ -122,7 +122,8 @@ class Reading:
             rows[first - 1 : last] = [b" " * len(row) for row in rows[first - 1 : last]]
         left = [(first, f"lines {first} to {last} are") for first, last in self.lines]
         for name in self.names:
-            left += [(line, f"{name} is") for line in _without(name, rows, source)]
+            lines = _without(name, rows, source)
+            left += [(line, f"{name} is") for line in lines] or [(1, f"{name}, which is nowhere in it, is")]
         return (b"\n".join(rows) if rows else data), left
 
     def changed(self) -> dict[str, Any]:

@@ -64,7 +64,7 @@ def test_without_settings_and_with_strict(part: Path) -> None:
         (["--arc-centres", "maybe"], "auto, absolute, incremental"),
         (["--extruder", "no"], "auto, refuse, ignore"),
         (["--ignore", "G1"], "G1 cannot be left out"),
-        (["--ignore", "hello"], "nothing that can be ignored"),
+        (["--ignore", "hello!"], "nothing that can be ignored"),
     ],
 )
 def test_wrong_settings_are_named(part: Path, arguments: list[str], said: str) -> None:

@@ -173,6 +173,8 @@ def test_what_moves_is_not_left_out_with_a_word() -> None:
     with pytest.raises(InputError, match=r"FOO stands beside X10, .* line of its own") as caught:
         parse_program(SINUMERIK.format("N5 FOO X10"), reading=Reading(ignore=("FOO",)))
     assert (caught.value.line, caught.value.column) == (5, 4)
+    program = parse_program(SINUMERIK.format(""), reading=Reading(ignore=("WMTA",)))
+    assert any("WMTA, which is nowhere in it, is left out" in note for note in program.assumptions)
 
 
 def test_a_feed_of_zero_is_named_where_no_feed_is() -> None:

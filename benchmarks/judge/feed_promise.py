@@ -68,7 +68,7 @@ def case(seed: int, kind: str | None = None) -> Case:
     """The program of that number, and of that kind."""
     random = np.random.default_rng([STREAM, seed])
     kind = KINDS[seed % len(KINDS)] if kind is None else kind
-    tolerance = 10 ** random.uniform(*TOLERANCES)
+    tolerance = float(f"{10 ** random.uniform(*TOLERANCES):.4g}")
     slope = random.normal(size=3)
     at, rows, points, feeds, within = np.zeros(3), [], [], [], []
     for _ in range(int(random.integers(*BLOCKS))):
@@ -85,7 +85,7 @@ def case(seed: int, kind: str | None = None) -> Case:
         within += [tolerance] * len(new)
         feeds += [feed / 60.0] * len(new)
         at = end
-    text = "\n".join(["G21 G90 G94 G17", f"G64 P{tolerance:.4g}", "G0 X0 Y0 Z0", *rows, "M2", ""])
+    text = "\n".join(["G21 G90 G94 G17", f"G64 P{tolerance:g}", "G0 X0 Y0 Z0", *rows, "M2", ""])
     return Case(text, np.concatenate(points)[:-1], np.array(within[1:]), np.array(feeds), kind)
 
 

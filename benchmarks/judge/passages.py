@@ -15,7 +15,7 @@ Array = np.ndarray
 AROUND = 3  # chords on either side of where a vertex is passed that are looked at finely
 FINE = 64  # places of such a chord
 FIRM = 1e6  # how much more a square counts beyond what it may be [-]
-# What rounding leaves of a place [mm].
+# What rounding leaves of a place and of a distance [mm].
 ROUNDING = 1e-7
 
 
@@ -57,7 +57,7 @@ def _in_order(square: Array, within: Array) -> Array:
     more than it may be, `within` (V,)."""
     least, chosen = np.zeros(square.shape[1]), []
     for row, most in zip(square, within, strict=True):
-        cost = least + row + FIRM * np.maximum(row - most**2, 0.0)
+        cost = least + row + FIRM * np.maximum(row - (most + ROUNDING) ** 2, 0.0)
         least = np.minimum.accumulate(cost)
         chosen.append(np.maximum.accumulate(np.where(cost <= least, np.arange(len(cost)), 0)))
     at, last = np.zeros(len(square), dtype=int), square.shape[1] - 1

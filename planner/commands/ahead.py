@@ -18,7 +18,7 @@ from planner.base import kernel_files
 from planner.base.names import OPTIMAL, SINGLE_CORNERS
 
 MACHINE = "mill"
-# Lines, arcs and a helix; with corners that are blended, passed without a stop, and stopped at; and one so
+# Lines, arcs and a helix, and an F that changes; with corners that are blended, passed without a stop, and stopped at; and one so
 # short that other corners might be faster, which are planned beside it. The last one is so long that windows of
 # its search are solved side by side (joint/groups.py).
 LEGS = 450
@@ -34,9 +34,9 @@ X50.5 Y50.1
 G61
 X20 Y40 Z-1
 G64 P0.02
-X0 Y20
+X0 Y20 F2000
 G2 X10 Y20 Z-3 I5 J0
-G1 X30
+G1 X30 F3000
 M2
 """,
     "G21 G90 G64 P0.05 F2000\nG1 X10\nX12 Y5\nG3 X6 Y11 I-5 J1\nM2\n",

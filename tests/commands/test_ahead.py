@@ -73,3 +73,22 @@ def test_the_programs_have_every_kind_of_move() -> None:
 def test_the_plan_beside_is_made() -> None:
     """One that ends early would leave its kernels to the other process."""
     assert compile_corners()
+
+
+EXAMPLE = """
+from planner import plan
+from planner.base import kernel_files
+from planner.commands.ahead import compile_ahead
+ahead = set(compile_ahead())
+assert plan("planner/examples/bracket.ngc", "mill").least_time
+print(*set(kernel_files.used()) - ahead)
+"""
+
+
+@pytest.mark.slow
+def test_the_example_needs_no_kernel_that_is_not_compiled_ahead() -> None:
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", EXAMPLE], cwd=ROOT, env=env, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == ""

@@ -37,7 +37,8 @@ _NAME = re.compile(r"[A-Z$][A-Z_$]\w*(?: \w+)*")
 _MOVES = re.compile(
     r"(?:L[PN]|C[CPRT]|CTP|CIP|RND|CHF|APPR|DEP|F(?:LT?|CT?|POL|SELECT)|LBL|CALL|TOOL|CYCL|PLANE|PATTERN|BEGIN|END|"
     r"FUNCTION (?:TCPM|RESET)|FN ?(?!1[4-79])\d+|A?(?:TRANS|ROTS?|SCALE|MIRROR)|CROTS|TRA\w+|TO(?:FRAME|ROT)\w*|PAROT|SUPA|DIAM\w+|"
-    r"[ABC]?SPLINE|POLY|INVC?CW|KONT|OFFN|ANG|AR|AP|RP|CH[RF]|RNDM|TURN|GEOAX|CYCLE(?!832)\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|POS[AP]?|MOV|DEF|PROC|RET|CASE|MCALL|"
+    r"[ABC]?SPLINE|POLY|INVC?CW|KONT|OFFN|ANG|AR|AP|RPL?|PW|PL|SD|PO|FMAX|C?(?:AC|IC|DC)|C?AC[PN]|CH[RF]|RNDM|TURN|GEOAX|CYCLE(?!832)\d+|POCKET\d|SLOT\d|HOLES\d|LONGHOLE|"
+    r"POS[AP]?|MOV|DEF|PROC|RET|CASE|MCALL|"
     r"(?:EL|ELSE|END)?IF|ELSE|(?:END)?(?:WHILE|FOR|LOOP|SUB)|REPEATB?|UNTIL|GO(?:TO[BFC]?|SUB)|DO|SET|VAR|GLOBAL|EXTCALL|PCALL)\b"
 )
 _COORDINATES = re.compile(r"(?i)(?<!\w)I?[XYZABCUVW](?:[-+]?[\d.]+|[-+]?Q\d+|\s*=)")
@@ -160,10 +161,14 @@ def _without(name: str, rows: list[bytes], source: str) -> list[int]:
     Raises InputError for one with coordinates behind it."""
     spelled = r"[ \t]*".join(map(re.escape, re.findall(r"\d+|[A-Z_$]+", name)))
     own = r"(?:[ \t]*(?:\[[^\]]*\]|\([^)]*\)))*(?:[ \t]*=(?!=)[ \t]*[^\s;]+)?"
+    defined = re.compile(rf"(?i)\s*(?:N\d+\s*)?DEF\b[^;]*(?<![\w$.]){spelled}(?!\w)")
     word = re.compile(rf'(?i)([^;("]*?(?<![\w$.]))(?:{spelled})(?!\w)({own})')
     found = []
     for k, row in enumerate(rows):
         text = row.decode("latin-1")
+        if defined.match(text):
+            what = f"ignore: {name} is a variable of the program, and what follows it has another meaning without it"
+            raise InputError(what, source=source, line=k + 1, column=1)
         while match := word.match(text):
             end = match.end()
             if not match[2] and re.fullmatch(r"\s*(?:/\d?)?\s*N?\d*\s*", match[1], re.IGNORECASE):

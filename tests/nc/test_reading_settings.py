@@ -187,3 +187,15 @@ def test_a_feed_of_zero_is_named_where_no_feed_is() -> None:
 def test_a_conversational_program_is_known_under_another_dialect() -> None:
     with pytest.raises(InputError, match=r"looks like Heidenhain's: leave --dialect out"):
         parse_program(CONVERSATIONAL.format(""), reading=Reading(dialect="fanuc"))
+
+
+@pytest.mark.parametrize("name", ["RPL", "AC", "CIC", "PO", "FMAX"])
+def test_words_that_say_where_or_how_fast_a_move_goes_are_not_left_out(name: str) -> None:
+    with pytest.raises(InputError, match="cannot be left out"):
+        Reading(ignore=(name,))
+
+
+def test_a_variable_of_the_program_is_not_left_out() -> None:
+    text = "N1 DEF REAL WIDE, DEPTH\nN2 DEPTH=5\nN3 G1 G90 F100 Z=-DEPTH\nN4 M30\n"
+    with pytest.raises(InputError, match="1:1: ignore: DEPTH is a variable of the program"):
+        parse_program(text, reading=Reading(ignore=("DEPTH",), dialect="siemens"))

@@ -11,6 +11,7 @@ constraint, no solver. What it checks, and how sharp each check is:
                   positions
     nearest.py    where a motion is nearest to a vertex, exactly where it runs on cubics
     switches.py   on which block the motion is: the F word of a block holds up to the place nearest to the vertex at its end
+    passing.py    the record of that, and which chords need no look
     feed.py       the feed against the F word of that block, of every chord and every delivered speed
     worst.py      the worst of every quantity, and differences of positions
     tangential.py   the tangential acceleration and jerk

@@ -51,7 +51,7 @@ def nothing_between(places: int, axes: int) -> Between:
 @kernel()
 def look_between(
     t: FloatArray,
-    columns: FloatArray,
+    state: FloatArray,
     edges: FloatArray,
     edge: int,
     limits: FloatArray,
@@ -65,13 +65,13 @@ def look_between(
     """Into `found` what lies before the places `skip` and later, and into `known` (3,) how much is left open.
 
     t       : (n,) [s]
-    columns : (4, n, A) position and its derivatives there
+    state   : (n, 4, A) position and its derivatives there
     edges   : (L,) where the pieces of the motion begin, non-decreasing [s]; `edge` is the first after the place before `skip`
     limits  : (3, A) of velocity, acceleration and jerk; inf where acceleration may jump from piece to piece
     piece   : (n,) of the path, on which they are
     work    : (3, A)
     """
-    last, n, axes = len(edges), len(t), columns.shape[2]
+    last, n, axes = len(edges), len(t), state.shape[2]
     e = edge
     for k in range(max(skip, 1), n):
         before = e
@@ -83,16 +83,16 @@ def look_between(
         back = 0.0 if whole else t[k] - edges[e - 1]
         single = whole or h - to - back <= PERIOD_ROUNDING
         found.cut[k] = h - back if single else np.nan
-        if not (single and _agree(columns, limits, k, to, back)):
+        if not (single and _agree(state, limits, k, to, back)):
             known[UNKNOWN] += 1.0
             found.cut[k] *= 0.5 if whole else 1.0
             to = back = 0.0
-        _segment(columns, k - 1, to, k, work, found)
-        _segment(columns, k, -back, k, work, found)
+        _segment(state, k - 1, to, k, work, found)
+        _segment(state, k, -back, k, work, found)
         push, length = 0.0, 0.0
         for i in range(axes):
             push += found.acceleration[k, i] ** 2
-            length += (columns[0, k, i] - columns[0, k - 1, i]) ** 2
+            length += (state[k, 0, i] - state[k - 1, 0, i]) ** 2
         off = np.sqrt(push) * h * h / 8.0
         on = pieces.piece[piece[k]]
         if on["arc"] > STRAIGHT:
@@ -103,14 +103,14 @@ def look_between(
 
 
 @kernel(inline=True)
-def _agree(columns, limits, k, to, back):
+def _agree(state, limits, k, to, back):
     """Whether the cubics of the places k - 1 and k meet: `to` after the one, and `back` before the other."""
-    for i in range(columns.shape[2]):
-        v, a, j = columns[1, k - 1, i], columns[2, k - 1, i], columns[3, k - 1, i]
-        x = columns[0, k - 1, i] + to * (v + to * (a / 2 + to * j / 6))
+    for i in range(state.shape[2]):
+        v, a, j = state[k - 1, 1, i], state[k - 1, 2, i], state[k - 1, 3, i]
+        x = state[k - 1, 0, i] + to * (v + to * (a / 2 + to * j / 6))
         v, a = v + to * (a + to * j / 2), a + to * j
-        v1, a1, j1 = columns[1, k, i], columns[2, k, i], columns[3, k, i]
-        x1 = columns[0, k, i] - back * (v1 - back * (a1 / 2 - back * j1 / 6))
+        v1, a1, j1 = state[k, 1, i], state[k, 2, i], state[k, 3, i]
+        x1 = state[k, 0, i] - back * (v1 - back * (a1 / 2 - back * j1 / 6))
         v1, a1 = v1 - back * (a1 - back * j1 / 2), a1 - back * j1
         jumps = abs(a - a1) > ROUNDING * limits[1, i] and (back == 0.0 or limits[2, i] < np.inf)
         if jumps or abs(x - x1) > PLACE_ROUNDING or abs(v - v1) > ROUNDING * limits[0, i]:
@@ -119,12 +119,12 @@ def _agree(columns, limits, k, to, back):
 
 
 @kernel(inline=True)
-def _segment(columns, at, h, k, work, found):
+def _segment(state, at, h, k, work, found):
     """Take in the cubic of the place `at` over h, which is below 0 for what lies before it, into `found` at k."""
     ends = 0.0, 0.0
     inner, first, second = 0.0, 0.0, 0.0
-    for i in range(columns.shape[2]):
-        v, a, j = columns[1, at, i], columns[2, at, i], columns[3, at, i]
+    for i in range(state.shape[2]):
+        v, a, j = state[at, 1, i], state[at, 2, i], state[at, 3, i]
         v1, a1 = v + h * (a + h * j / 2), a + h * j
         most = max(abs(v), abs(v1))
         if a * a1 < 0.0:
@@ -143,7 +143,7 @@ def _segment(columns, at, h, k, work, found):
     for part in range(PARTS):
         p, q = part / PARTS, (part + 1) / PARTS
         b0, b1, b2, b3, b4 = 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(columns.shape[2]):
+        for i in range(state.shape[2]):
             w0, w1, w2 = work[0, i], work[1, i], work[2, i]
             d0, d1 = w1 - w0, w2 - w1
             u0 = w0 + p * (2.0 * d0 + p * (d1 - d0))

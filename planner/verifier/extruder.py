@@ -30,7 +30,15 @@ from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces
 from planner.verifier.stream import Observed, overlapping
 from planner.verifier.user_limits import along_path
 from planner.verifier.verdict import LimitCheck
-from planner.verifier.worst import COLUMN, ROUNDING_ULPS, SampleBlock, Worst, differences, less_error
+from planner.verifier.worst import (
+    COLUMN,
+    ROUNDING_ULPS,
+    SampleBlock,
+    Worst,
+    differences,
+    less_error,
+    state_of,
+)
 
 NEAR = 8.0  # within so many tolerances of way E is the programmed one where a joint is passed [-]
 REST = 1e-9  # axes that move less than this between samples rest [mm]
@@ -87,8 +95,7 @@ class _Watch:
         self.end = float(e[-1])
         if len(t) < 2:
             return
-        columns = {name: getattr(chunk, name) for name in ("t", "position", *DERIVATIVES)}
-        block = SampleBlock(**columns, piece=np.zeros(len(t), dtype=np.int64))
+        block = SampleBlock(t=t, state=state_of(chunk)[1], piece=np.zeros(len(t), dtype=np.int64))
         h, chord = np.diff(t), np.linalg.norm(np.diff(position, axis=0), axis=1)
         self.period = max(self.period, float(h.max()))
         moved = np.maximum(np.abs(np.diff(e)) - 2.0 * off, 0.0)

@@ -20,8 +20,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.verifier.excess import NAMES
 from planner.verifier.kernel import kernel
+from planner.verifier.passing import JUDGED, OPEN, SURE, Bounds, Chords
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces, axis_groups
-from planner.verifier.switches import JUDGED, OPEN, SURE, Bounds, Chords, Switches
+from planner.verifier.switches import Switches
 from planner.verifier.worst import COLUMN, DIFFERENCE, Worst
 
 

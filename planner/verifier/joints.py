@@ -41,7 +41,7 @@ from planner.verifier.limits import NORMAL_NAME, limits_of, look_at_axes, rows_o
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING
 from planner.verifier.stream import overlapping
 from planner.verifier.verdict import LimitCheck, Verdict
-from planner.verifier.worst import BACK, SampleBlock, Worst
+from planner.verifier.worst import BACK, SampleBlock, Worst, state_of
 
 # Limits of the tip's own coordinates, which are not judged: so many times the largest of the joints [-].
 NOT_JUDGED = 100.0
@@ -174,11 +174,10 @@ def _joint_checks(
     worst = Worst(rows_of(limits), len(limits.axes))
     travelled, skip = 0.0, 0
     for part in overlapping(setpoints, BACK):
-        columns = {name: getattr(part, name) for name in ("t", "position", *DERIVATIVES)}
+        t, state = state_of(part)
         piece = np.asarray(part.line, dtype=np.int64)  # the line itself
-        block = SampleBlock(**columns, piece=piece, skip=skip, travelled=travelled)
-        look_at_axes(block, limits, worst)
-        travelled, skip = float(block.travelled_to()[-1]), min(BACK, len(part))
+        block = SampleBlock(t=t, state=state, piece=piece, skip=skip, travelled=travelled)
+        travelled, skip = look_at_axes(block, limits, worst), min(BACK, len(part))
     checks = [
         check_of(worst, row, toolpath, int(worst.piece[row]), not_limited)
         for row in range(len(DERIVATIVES) * len(limits.axes))

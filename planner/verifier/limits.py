@@ -26,24 +26,27 @@ Only columns that were delivered are judged as columns, and compared with the po
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
+from planner.base.arrays import Array, FloatArray
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.between import Between
+from planner.verifier.excess import NAMES
 from planner.verifier.given import DERIVATIVES, Given
+from planner.verifier.kernel import kernel
 from planner.verifier.pieces import RATIO_ROUNDING
 from planner.verifier.power import units_of
 from planner.verifier.worst import (
     COLUMN,
     DIFFERENCE,
+    ROUNDING_ULPS,
     Limits,
     SampleBlock,
     Worst,
     differences,
-    less_error,
     position_error,
 )
 
@@ -57,6 +60,7 @@ VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERAT
 GROUPS = 6
 FEED, NORMAL, CHORD, TANGENTIAL = range(4)  # the last of two rows: acceleration, jerk
 ROWS_ALONE = 5
+OF_NORMAL = NAMES.index(NORMAL_NAME)
 
 
 def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limited: tuple[str, ...]) -> Limits:
@@ -123,63 +127,180 @@ def rows_of(limits: Limits) -> list[tuple[str, str]]:
 
 def look_at_axes(
     block: SampleBlock, limits: Limits, worst: Worst, between: Between | None = None, sure: bool = False
-) -> None:
-    """Take in what a block of samples shows of the axes, of the normal acceleration and of the columns.
+) -> float:
+    """Take in what a block of samples shows of the axes, of the normal acceleration and of the columns. -> path length run to
+    its end [mm]
 
     between : what lies between the samples too, of velocity and acceleration
     sure    : the columns are those of the positions, nothing lies between that they do not show, and no acceleration jumps
     """
-    t, axes, linear = block.t, len(limits.axes), limits.linear
-    columns = [block.velocity, block.acceleration, block.jerk]
-    if between is not None:
-        columns[:2] = between.velocity, between.acceleration
-    for order, column in enumerate(columns):
-        if limits.judged[order]:
-            worst.take(order * axes, np.abs(column), limits.per_axis[order], COLUMN, block, span=order)
-    period = np.diff(t, prepend=-np.inf)[:, None]
-    if not sure:
-        seen = differences(t, block.position, position_error(block, limits))
-        for order, difference in enumerate(seen):
-            allowed = limits.per_axis[order]
-            worst.take(order * axes, less_error(difference), allowed, DIFFERENCE, block)
-        if limits.judged[0]:
-            _look_at_gaps(block, limits, worst, seen[0], 1.0 / period)
-    how = COLUMN if limits.judged[:2].all() else DIFFERENCE
-    if how == COLUMN:
-        normal = _normal(block.velocity[:, linear], block.acceleration[:, linear])
-        taken_off = np.zeros_like(normal)
-    else:
-        normal, taken_off = _mean_normal(block, limits, *seen[1])
-    row, span = GROUPS * axes, ACCELERATION + 3 if how == COLUMN else None
-    worst.take(row + NORMAL, (normal - taken_off)[:, None], limits.normal, how, block, span=span)
-    period[0] = 0.0
-    worst.take(row + CHORD, normal[:, None] * period * period / 8.0, 1.0, how, block)
+    axes, linear, alone = len(limits.axes), limits.linear, GROUPS * len(limits.axes)
+    nothing = np.empty((0, axes))
+    widest = (nothing, nothing) if between is None else (between.velocity, between.acceleration)
+    allowed = Allowed(
+        limits.per_axis,
+        linear,
+        limits.judged,
+        limits.rounding,
+        float(limits.time_rounding),
+        float(limits.normal),
+    )
+    most, found = np.zeros(len(NAMES)), (worst.row, worst.time, worst.at, worst.piece)
+    travelled = _look(
+        block.t, block.state, widest, block.piece, block.skip, block.travelled, allowed, sure, np.zeros((5, axes)),
+        found, most,
+    )  # fmt: skip
+    for order, column in enumerate((*widest, nothing)):
+        if limits.judged[order] or not sure:
+            worst.bound(order * axes, limits.per_axis[order])
+        if most[order] > 1.0:
+            column = column if len(column) else np.abs(block.state[:, 1 + order])
+            worst.exceeded(order, column / limits.per_axis[order], block)
+    if limits.judged[:2].all():
+        worst.bound(alone + NORMAL, limits.normal)
+        if most[OF_NORMAL] > 1.0:
+            normal = _normal(block.velocity[:, linear], block.acceleration[:, linear])[:, None]
+            worst.exceeded(OF_NORMAL, normal / limits.normal, block)
+        return float(travelled)
+    second = differences(block.t, block.position, position_error(block, limits))[1]
+    normal, taken_off = _mean_normal(block, limits, *second)
+    worst.take(alone + NORMAL, (normal - taken_off)[:, None], limits.normal, DIFFERENCE, block)
+    period = np.diff(block.t, prepend=block.t[:1])
+    worst.take(alone + CHORD, (normal * period * period / 8.0)[:, None], 1.0, DIFFERENCE, block)
+    return float(travelled)
 
 
-def _look_at_gaps(
-    block: SampleBlock,
-    limits: Limits,
-    worst: Worst,
-    difference: tuple[FloatArray, FloatArray],
-    over: FloatArray,
-) -> None:
-    """By how much the columns miss the differences (module text), over h, h^2, h; `over` (n, 1) is 1/h."""
-    axes, (v_max, a_max, j_max) = len(limits.axes), limits.per_axis
-    gap = np.abs(difference[0] - _means(block.velocity)) - difference[1] - RATIO_ROUNDING * v_max
-    gap = np.maximum(gap, 0.0) * over
-    worst.take(GAP_BY_ACCELERATION * axes, gap, a_max / 4.0, COLUMN, block)
-    worst.take(GAP_BY_JERK * axes, gap * over, j_max / 12.0, COLUMN, block)
-    if limits.judged[1]:
-        change = np.diff(block.velocity, axis=0, prepend=block.velocity[:1]) * over
-        noise = RATIO_ROUNDING * (v_max * over + a_max)
-        gap = np.maximum(np.abs(change - _means(block.acceleration)) - noise, 0.0) * over
-        worst.take(GAP_OF_ACCELERATION * axes, gap, j_max / 4.0, COLUMN, block)
+class Allowed(NamedTuple):
+    """Some of `Limits`, for the kernel."""
+
+    per_axis: FloatArray
+    linear: Array
+    judged: Array
+    rounding: FloatArray
+    time_rounding: float
+    normal: float
 
 
-def _means(column: FloatArray) -> FloatArray:
-    """(n, A) mean of each sample and the one before it; of the first itself."""
-    mean: FloatArray = 0.5 * (column + np.concatenate([column[:1], column[:-1]]))
-    return mean
+@kernel()
+def _look(
+    t: FloatArray,
+    state: FloatArray,
+    widest: tuple[FloatArray, FloatArray],
+    piece: Array,
+    skip: int,
+    travelled: float,
+    allowed: Allowed,
+    sure: bool,
+    work: FloatArray,
+    found: tuple[FloatArray, FloatArray, FloatArray, Array],
+    most: FloatArray,
+) -> float:
+    """The columns of samples, the differences of their positions (worst.py), by how much the columns miss these (module text)
+    over h, h^2, h, and the normal acceleration by the columns.
+
+    t, state, piece, skip, travelled : as in `SampleBlock`
+    widest : (n, A) velocities and accelerations in place of the columns, which the differences are compared with; or (0, A)
+    work   : (5, A) zeros: of the sample before its error, first and second difference with theirs
+    found  : row, time, at and piece of `Worst`
+    most   : (6,) largest ratio of the columns of each quantity of `NAMES`, where it is above 1
+
+    -> path length run to the last sample [mm]
+    """
+    n, _, axes = state.shape
+    (v_max, a_max, j_max), judged = allowed.per_axis, allowed.judged
+    ulp, run, none = ROUNDING_ULPS * 2.0**-52, 0.0, -1
+    for k in range(n):
+        here = k, t, state, piece
+        h = t[k] - t[k - 1] if k else np.inf
+        over, over2, over3 = 1.0 / h, 0.0, 0.0
+        if k > 1:
+            over2 = 2.0 / (t[k] - t[k - 2])
+        if k > 2:
+            over3 = 3.0 / (t[k] - t[k - 3])
+        if k >= max(skip, 1):
+            step_sq = 0.0
+            for i in range(axes):
+                step_sq += (state[k, 0, i] - state[k - 1, 0, i]) ** 2
+            run += np.sqrt(step_sq)
+        speed_sq, along = 0.0, 0.0
+        for i in range(axes):
+            x, v, a = state[k, 0, i], state[k, 1, i], state[k, 2, i]
+            if allowed.linear[i]:
+                speed_sq, along = speed_sq + v * v, along + v * a
+            if k >= skip:
+                if judged[0]:
+                    _keep(
+                        found,
+                        most,
+                        0,
+                        i,
+                        widest[0][k, i] if len(widest[0]) else abs(v),
+                        v_max[i],
+                        COLUMN,
+                        here,
+                    )
+                if judged[1]:
+                    most_a = widest[1][k, i] if len(widest[1]) else abs(a)
+                    _keep(found, most, 1, axes + i, most_a, a_max[i], COLUMN, here)
+                if judged[2]:
+                    _keep(found, most, 2, 2 * axes + i, abs(state[k, 3, i]), j_max[i], COLUMN, here)
+            if sure:
+                continue
+            off = ulp * (abs(x) + (travelled + run) + v_max[i] * t[k]) + allowed.rounding[i]
+            if k == 0:
+                work[0, i] = off
+                continue
+            change = x - state[k - 1, 0, i]
+            if allowed.time_rounding > 0.0:
+                late = allowed.time_rounding * (abs(change) / h + a_max[i] * h)
+                off += late
+                work[0, i] += late if k == 1 else 0.0
+            first, wrong = over * change, over * (off + work[0, i])
+            second, wrong2 = over2 * (first - work[1, i]), over2 * (wrong + work[2, i])
+            third, wrong3 = over3 * (second - work[3, i]), over3 * (wrong2 + work[4, i])
+            work[0, i], work[1, i], work[2, i], work[3, i], work[4, i] = off, first, wrong, second, wrong2
+            if k < skip:
+                continue
+            _keep(found, most, none, i, abs(first) - wrong, v_max[i], DIFFERENCE, here)
+            _keep(found, most, none, axes + i, abs(second) - wrong2, a_max[i], DIFFERENCE, here)
+            _keep(found, most, none, 2 * axes + i, abs(third) - wrong3, j_max[i], DIFFERENCE, here)
+            if judged[0]:
+                v0, a0 = state[k - 1, 1, i], state[k - 1, 2, i]
+                gap = abs(first - 0.5 * (v + v0)) - wrong - RATIO_ROUNDING * v_max[i]
+                gap = max(gap, 0.0) * over
+                _keep(found, most, none, GAP_BY_ACCELERATION * axes + i, gap, a_max[i] / 4.0, COLUMN, here)
+                _keep(found, most, none, GAP_BY_JERK * axes + i, gap * over, j_max[i] / 12.0, COLUMN, here)
+                if judged[1]:
+                    noise = RATIO_ROUNDING * (v_max[i] * over + a_max[i])
+                    gap = max(abs((v - v0) * over - 0.5 * (a + a0)) - noise, 0.0) * over
+                    _keep(
+                        found, most, none, GAP_OF_ACCELERATION * axes + i, gap, j_max[i] / 4.0, COLUMN, here
+                    )
+        if k >= skip and judged[0] and judged[1] and speed_sq > FEED_AT_REST * FEED_AT_REST:
+            across = 0.0
+            for i in range(axes):
+                if allowed.linear[i]:
+                    across += (state[k, 2, i] - along / speed_sq * state[k, 1, i]) ** 2
+            normal, bow = np.sqrt(across), h if k else 0.0
+            _keep(found, most, OF_NORMAL, GROUPS * axes + NORMAL, normal, allowed.normal, COLUMN, here)
+            _keep(found, most, none, GROUPS * axes + CHORD, normal * bow * bow / 8.0, 1.0, COLUMN, here)
+    return travelled + run
+
+
+@kernel(inline=True)
+def _keep(found, most, span, row, value, limit, how, here):
+    """Take in a value of a row, always of one limit: its ratio is the largest where the value is."""
+    seen, time, at, piece = found
+    if value > seen[row, 1] or (span >= 0 and value > limit):
+        ratio = value / limit
+        if span >= 0:
+            most[span] = max(most[span], ratio)
+        if ratio > seen[row, 0]:
+            seen[row, 0], seen[row, 1], seen[row, 2], seen[row, 3] = ratio, value, limit, how
+            k, t, state, pieces = here
+            time[row], piece[row] = t[k], pieces[k]
+            for i in range(at.shape[1]):
+                at[row, i] = state[k, 0, i]
 
 
 def _normal(v: FloatArray, a: FloatArray) -> FloatArray:

@@ -303,7 +303,7 @@ def _stray(
     return np.inf, tally[LAST], feed
 
 
-@kernel()
+@kernel(inline=True)
 def _commit(match: Match, first: int, last: int) -> None:
     """Make the possible pieces `first` to `last` of match.track.new the present ones."""
     match.tally[ASTRAY] = 0

@@ -18,16 +18,15 @@ from planner.verifier.given import DERIVATIVES
 from planner.verifier.kernel import kernel
 from planner.verifier.limits import FEED, GROUPS, ROWS_ALONE, look_at_axes, rows_of
 from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, match_samples, new_match, nowhere
+from planner.verifier.passing import Bounds, Chords
 from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.power import look_at_power
 from planner.verifier.stops import AtStop
-from planner.verifier.switches import Bounds, Chords
 from planner.verifier.tangential import look_at_tangential
 from planner.verifier.user_limits import look_at_user_limits
-from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst
+from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst, state_of
 
 BLOCK_SAMPLES = SIZES.judged_at_once
-COLUMNS = ("t", "position", *DERIVATIVES)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -84,7 +83,7 @@ class Watch:
         axes = pieces.vertex.shape[1]
         self.seen = Observed(match=new_match(pieces), worst=Worst(rows_of(limits), axes), note=note)
         self._pieces, self._limits, self._parts, self._cubic = pieces, limits, parts, cubic
-        self._carried = [np.empty((0, *shape)) for shape in ((), *[(axes,)] * 4)]
+        self._carried = np.empty(0), np.empty((0, 1 + len(DERIVATIVES), axes))
         self._travelled = 0.0
         self._edges, self._feed_before = edges, 0.0
         jerk = limits.per_axis[2] if limits.jerk_limited else np.full(axes, np.inf)
@@ -100,50 +99,44 @@ class Watch:
         """Read the next samples."""
         begin = int(np.searchsorted(chunk.t, self.seen.t_last, side="right"))
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
-            new = [getattr(chunk, name)[low : low + BLOCK_SAMPLES] for name in COLUMNS]
-            columns = [np.concatenate(pair) for pair in zip(self._carried, new, strict=True)]
-            self._take_block(*columns, skip=len(self._carried[0]))
+            t, state = state_of(chunk, slice(low, low + BLOCK_SAMPLES), self._carried)
+            self._take_block(t, state, skip=len(self._carried[0]))
             # copies: views would keep the whole block
-            self._carried = [column[-BACK:].copy() for column in columns]
+            self._carried = t[-BACK:].copy(), state[-BACK:].copy()
 
-    def _take_block(self, t: FloatArray, *of_axes: FloatArray, skip: int) -> None:
-        """Take in one block, the carried samples first; of_axes: position and its derivatives (n, A)."""
-        pieces, limits, seen, (position, velocity, *_) = self._pieces, self._limits, self.seen, of_axes
+    def _take_block(self, t: FloatArray, state: FloatArray, skip: int) -> None:
+        """Take in one block, the carried samples first; state as in `SampleBlock`."""
+        pieces, limits, seen = self._pieces, self._limits, self.seen
+        position = np.ascontiguousarray(state[:, 0])
         seen.take(t, position, skip)
         place = nowhere(len(t))
-        cubic = velocity if self._cubic else velocity[:0]
+        cubic = np.ascontiguousarray(state[:, 1]) if self._cubic else position[:0]
         match_samples(pieces, seen.match, t, position, skip, self._parts, cubic, self._at_stop, place)
         both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
         seen.apart = np.maximum(seen.apart, both)
-        # by columns: the worst of each is looked for
-        columns = dict(zip(COLUMNS[1:], map(np.asfortranarray, of_axes), strict=True))
-        block = SampleBlock(t=t, **columns, piece=place.piece, skip=skip, travelled=self._travelled)
+        block = SampleBlock(t=t, state=state, piece=place.piece, skip=skip, travelled=self._travelled)
         if self._edges is None:
-            look_at_axes(block, limits, seen.worst)
-            stacked, cut = position[None], np.full(len(t), np.nan)
+            self._travelled = look_at_axes(block, limits, seen.worst)
+            known, cut = position[:, None], np.full(len(t), np.nan)
         else:
-            stacked = np.stack(of_axes)
-            cut = self._take_between(block, self._edges, stacked, place)
-        self._take_feeds(block, place, cut, np.ascontiguousarray(stacked.transpose(1, 0, 2)))
+            known, cut = state, self._take_between(block, self._edges, place)
+        self._take_feeds(block, place, cut, known)
         look_at_tangential(block, limits, seen.worst)
         power = GROUPS * len(limits.axes) + ROWS_ALONE
         look_at_power(block, limits, seen.worst, power)
         look_at_user_limits(block, limits, seen.worst, power + len(limits.axes))
-        self._travelled = float(block.travelled_to()[-1])
 
     def _take_feeds(self, block: SampleBlock, place: Located, cut: FloatArray, state: FloatArray) -> None:
         t, speed = block.t, np.full(len(block.t), np.nan)
         if self._limits.judged[0]:
-            speed = np.sqrt(np.einsum("na,na->n", block.velocity, block.velocity))
+            v = np.asfortranarray(block.velocity)
+            speed = np.sqrt(np.einsum("na,na->n", v, v))
         none, (piece, _, first, last) = np.zeros_like(t), place
         chords = Chords(t, none, none.copy(), speed, piece, first, last, cut, state)
         self._feeds.take(chords, block.skip)
 
-    def _take_between(
-        self, block: SampleBlock, edges: FloatArray, columns: FloatArray, place: Located
-    ) -> FloatArray:
-        """Take in a block of a motion and what lies between its times; `columns` (4, n, A) as in `look_between`. -> (n,) as
-        `Between.cut`"""
+    def _take_between(self, block: SampleBlock, edges: FloatArray, place: Located) -> FloatArray:
+        """Take in a block of a motion and what lies between its times. -> (n,) as `Between.cut`"""
         limits, worst, skip = self._limits, self.seen.worst, block.skip
         axes = len(limits.axes)
         found = nothing_between(len(block.t), axes)
@@ -151,11 +144,11 @@ class Watch:
         unknown = self.seen.known[UNKNOWN]
         bounds = limits.per_axis + np.array([[0.0], [0.0], [0.0 if limits.jerk_limited else np.inf]])
         look_between(
-            block.t, columns, edges, edge, bounds, skip, self._pieces, place.piece,
+            block.t, block.state, edges, edge, bounds, skip, self._pieces, place.piece,
             np.empty((3, axes)), found, self.seen.known,
         )  # fmt: skip
         sure = limits.jerk_limited and self.seen.known[UNKNOWN] == unknown
-        look_at_axes(block, limits, worst, found, sure=bool(sure))
+        self._travelled = look_at_axes(block, limits, worst, found, sure=bool(sure))
         # where the block changes the larger F counts, and where the motion is lost none
         feed = np.where(place.last >= 0, place.feed_max, np.inf)
         feed[:skip] = np.inf

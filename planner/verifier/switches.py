@@ -16,90 +16,36 @@ vertices that are nearest out of order within one chord the place together count
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
 from planner.verifier.kernel import kernel
 from planner.verifier.nearest import nearest, reach_with_rounding
+from planner.verifier.passing import (
+    CHORD,
+    HEAD,
+    JUDGED,
+    OPEN,
+    OUTSIDE,
+    PASSED,
+    PATIENCE,
+    RUN_THROUGH,
+    SURE,
+    SWITCH,
+    TAIL,
+    TRAVELLED,
+    USED,
+    Bounds,
+    Chords,
+    Passing,
+    nearer_soon,
+    rounding_of,
+)
 from planner.verifier.pieces import PLACE_ROUNDING, ProgramPieces, out_of_reach, reach_chord
-from planner.verifier.worst import ROUNDING_ULPS
 
-# cost: least sum of squared distances up to this vertex, from the first open one on, inf before it is looked
-# at [mm2]; place: where it is passed along the chords from the start [mm]; begin, end: from where the block
-# after it may have begun, and to where the one before it may last; group: number of vertices
-# passed together; chord: on which, of those kept
-SWITCH = np.dtype(
-    [(name, "f8") for name in ("cost", "place", "begin", "end")] + [("group", "i8"), ("chord", "i8")]
-)
-# first, count, offset: the vertices that were looked at, and where the marks of those that came nearer begin;
-# begin: place of the chord's start [mm]; step, h, cut, error: its length [mm], duration, end of the cubic that it begins with
-# (NaN where it is not known) [s], rounding [mm]
-CHORD = np.dtype(
-    [(name, "i8") for name in ("first", "count", "offset")]
-    + [(name, "f8") for name in ("begin", "step", "h", "cut", "error")]
-)
-# In `state`: the first vertex not settled; first and behind the last of the chords kept; marks used; the last vertex that is
-# passed; how many chords there may be before it is tried again to settle those that are passed.
-OPEN, HEAD, TAIL, USED, PASSED, PATIENCE = range(6)
-SURE, TRAVELLED, JUDGED = range(3)  # in `along`: the open vertex is not passed, length run, judged to [mm]
-# Price of a full stop passed where the motion does not rest [budgets]: more than of all vertices around.
-RUN_THROUGH = 1e3
-# How much more a square counts beyond the tolerance of its vertex [-]: what rounding adds there is below other distances.
-OUTSIDE = 1e3
 # How much more firmly the place of a full stop is held than others passed together with it [-].
 FIRM = 1e9
 ROOM = 4096  # chords and marks there is room for at first
-
-
-class Bounds(NamedTuple):
-    """velocity (A,), digits (A+1,) as in limits.py; norm of the largest accelerations, inf if not judged."""
-
-    velocity: FloatArray
-    digits: FloatArray
-    acceleration: float
-
-
-class Chords(NamedTuple):
-    """Samples whose feed is still to be judged, the first one as the beginning of a chord.
-
-    t, place, error : (n,) [s]; length of chords from the start [mm]; largest rounding error [mm]
-    speed           : (n,) as delivered [mm/s], NaN where it was not
-    piece           : (n,) where each is, to be told; first, last: (n,) the pieces it can be on (matching.py)
-    cut             : (n,) as `Between.cut` [s], NaN where nothing is known between
-    state           : (n, D, A) position, and derivatives where `cut` is known
-    """
-
-    t: FloatArray
-    place: FloatArray
-    error: FloatArray
-    speed: FloatArray
-    piece: Array
-    first: Array
-    last: Array
-    cut: FloatArray
-    state: FloatArray
-
-
-class Passing(NamedTuple):
-    """Where a motion passes the vertices, as far as its samples tell.
-
-    switch  : (N+1,) `SWITCH`
-    state   : (6,) as named above
-    along   : (3,) likewise; its last number is for who judges, and what is judged stays
-    work    : (A,) a place that is worked with
-    chord, ends, mark : chords since the last vertex that was settled: `CHORD` (C,), position and its derivatives at
-              their ends (C, 2, 4, A), and marks
-    """
-
-    switch: Array
-    state: Array
-    along: FloatArray
-    work: FloatArray
-    chord: Array
-    ends: FloatArray
-    mark: Array
 
 
 class Switches:
@@ -149,27 +95,23 @@ def _passed(pieces: ProgramPieces, found: Passing, new: Chords, skip: int, bound
     places and errors into `new`. -> the first sample there was no room for, or their number"""
     switch, state, along = found.switch, found.state, found.along
     n, _, axes = new.state.shape
-    ulp = ROUNDING_ULPS * 2.0**-52
+    look = ask = max(skip, 1)  # the chords before are not the nearest ones, or known to be looked at
     for k in range(skip, n):
         h = new.t[k] - new.t[k - 1] if k else 0.0
-        push = bounds.acceleration * h if math.isfinite(bounds.acceleration) else 0.0
-        step_sq, error_sq, begin = 0.0, 0.0, along[TRAVELLED]
+        step_sq, begin = 0.0, along[TRAVELLED]
         for axis in range(axes):
-            move = abs(new.state[k, 0, axis] - new.state[k - 1, 0, axis]) if k else 0.0
-            step_sq += move * move
-            error = ulp * (abs(new.state[k, 0, axis]) + begin + bounds.velocity[axis] * new.t[k])
-            error += bounds.digits[axis] + (bounds.digits[axes] * (move / h + push) if k else 0.0)
-            error_sq += error * error
-        step, rounding = math.sqrt(step_sq), math.sqrt(error_sq)
-        last = min(new.last[k] + 1, len(switch) - 2)
+            step_sq += (new.state[k, 0, axis] - new.state[k - 1, 0, axis]) ** 2 if k else 0.0
+        step, rounding = math.sqrt(step_sq), rounding_of(new, k, begin, bounds)
+        last, gone = min(new.last[k] + 1, len(switch) - 2), min(new.first[k], len(switch) - 2)
         first = max(state[OPEN], state[PASSED] + 1)
+        if k >= ask and first == state[OPEN] == last and gone < first:
+            look, ask = nearer_soon(pieces, found, new, k, bounds)
         if state[TAIL] == len(found.chord) or state[USED] + max(last + 1 - first, 0) > len(found.mark):
             return k
         along[TRAVELLED] += step
         new.place[k], new.error[k] = along[TRAVELLED], rounding
-        if step > 0.0:
+        if step > 0.0 and k >= look:
             _look(pieces, found, new, k, last, (begin, step, h, new.cut[k], rounding), bounds)
-        gone = min(new.first[k], len(switch) - 2)
         if (
             k
             and gone >= state[OPEN]
@@ -190,7 +132,7 @@ def _put_ends(ends, new, k):
                 ends[side, order, axis] = new.state[k - 1 + side, order, axis]
 
 
-@kernel()
+@kernel(inline=True)
 def _look(
     pieces: ProgramPieces,
     found: Passing,

@@ -21,7 +21,9 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Spans, above
+from planner.verifier.given import DERIVATIVES
 
 ROUNDING_ULPS = 4.0  # of the position, in units of 2^-52 of the numbers it is computed from
 COLUMN, DIFFERENCE = 0, 1  # how a value was seen
@@ -62,9 +64,8 @@ class Worst:
         ratio = (value / limit)[block.skip :]
         if not len(ratio):
             return
-        rows = slice(first, first + value.shape[1])
         least = np.asarray(limit)[block.skip :].min(axis=0) if np.ndim(limit) == 2 else limit
-        self.least[rows] = np.minimum(self.least[rows], least)
+        self.bound(first, np.broadcast_to(least, value.shape[1:]))
         limit, most = np.broadcast_to(limit, value.shape), 0.0
         for k, n in enumerate(ratio.argmax(axis=0).tolist()):
             most = max(most, ratio[n, k])
@@ -73,9 +74,18 @@ class Worst:
                 seen = float(ratio[n, k]), float(value[at, k]), float(limit[at, k]), how
                 self.keep(first + k, seen, float(block.t[at]), block.position[at], int(block.piece[at]))
         if span is not None and most > 1.0:
-            over = above(ratio.max(axis=1))
-            if over.any():
-                self.over.add(span, block.t[block.skip :], over)
+            self.exceeded(span, value / limit, block)
+
+    def exceeded(self, span: int, ratio: FloatArray, block: SampleBlock) -> None:
+        """Note where a `ratio` (n, K) of a quantity of `NAMES` is above 1 in a block."""
+        over = above(ratio[block.skip :].max(axis=1))
+        if over.any():
+            self.over.add(span, block.t[block.skip :], over)
+
+    def bound(self, first: int, limit: FloatArray | float) -> None:
+        """The quantities from `first` on are limited: to `limit` (K,), or one to a number."""
+        rows = slice(first, first + np.size(limit))
+        self.least[rows] = np.minimum(self.least[rows], limit)
 
     def keep(
         self, row: int, seen: tuple[float, float, float, int], time: float, at: FloatArray, piece: int
@@ -151,18 +161,32 @@ class Limits:
 class SampleBlock:
     """Samples n of a motion, those before `skip` for the differences only."""
 
-    # (n,) [s]; position, velocity, acceleration, jerk: (n, A), zeros where they were not delivered
-    t: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
+    t: FloatArray  # (n,) [s]
+    state: FloatArray  # (n, 4, A) position, velocity, acceleration, jerk, zeros where they were not delivered
     piece: Array  # (n,) the piece of the path that each is on
     skip: int = 0
     travelled: float = 0.0  # path length run before [mm]
+
+    position = property(lambda self: self.state[:, 0])
+    velocity = property(lambda self: self.state[:, 1])
+    acceleration = property(lambda self: self.state[:, 2])
+    jerk = property(lambda self: self.state[:, 3])
 
     def travelled_to(self) -> FloatArray:
         """(n,) path length run at each sample [mm]."""
         step = np.linalg.norm(np.diff(self.position, axis=0, prepend=self.position[:1]), axis=1)
         step[: max(self.skip, 1)] = 0.0
         return self.travelled + np.cumsum(step)
+
+
+def state_of(
+    chunk: Trajectory, part: slice = slice(None), before: tuple[FloatArray, FloatArray] | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """t (n,) and state (n, 4, A), as in `SampleBlock`, of a part of a chunk of samples, behind those `before`."""
+    new, axes = chunk.t[part], chunk.position.shape[1]
+    t, state = before or (new[:0], np.empty((0, 1 + len(DERIVATIVES), axes)))
+    whole = np.empty((len(t) + len(new), *state.shape[1:]))
+    whole[: len(t)] = state
+    for order, name in enumerate(("position", *DERIVATIVES)):
+        whole[len(t) :, order] = getattr(chunk, name)[part]
+    return np.concatenate([t, new]), whole

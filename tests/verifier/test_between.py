@@ -72,7 +72,8 @@ def looked(motion, t, limits=FREE):
     pieces = program_pieces(Moves().line(1e3).toolpath(M))
     found, known = nothing_between(len(t), 3), np.zeros(3)
     columns, piece = motion.columns(t), np.zeros(len(t), dtype=np.int64)
-    look_between(t, columns, motion.t, 1, limits, 0, pieces, piece, np.empty((3, 3)), found, known)
+    state = np.ascontiguousarray(columns.transpose(1, 0, 2))
+    look_between(t, state, motion.t, 1, limits, 0, pieces, piece, np.empty((3, 3)), found, known)
     return found, known, columns
 
 

@@ -6,6 +6,8 @@ Real programs are those of `--nc`, left out where that is absent. Generated are
 
     contour   chords of 0.05 to 0.2 mm along a wavy contour
     carving   chords of 1 to 20 um along the strokes of a carved text: arcs with kinks between them, deeper where a stroke is wider
+    lettering strokes of 5 to 80 legs of 0.1 to 15 um, a lift between them: short runs, nearly all of them held by the feed
+    drawing   strokes of 3 to 30 lines of 0.3 to 3 mm, a lift between them, as a pen plotter has them
     relief    rows of a milled relief (benchmarks/cost/growth.py)
 
 Processor and wall seconds are of planning alone, on compiled kernels; memory is the largest resident set of the process. On several
@@ -42,6 +44,10 @@ CHORD, CHORD_FEED = (0.05, 0.2), 3000  # of the contour: [mm], [mm/min]
 WAVES = ((20.0, 0.005), (5.0, 0.05), (0.5, 0.4))  # of the contour: height [mm], 1/mm
 STEP, STEP_FEED, STROKE = (0.001, 0.02), 1800, (0.4, 6.0)  # of the carving: [mm], [mm/min], radii [mm]
 DEPTH = (0.2, 0.15)  # of the carving, and by how much it changes along a stroke [mm]
+# Strokes of the lettering and the drawing: legs of each, their length [mm], feed [mm/min], turn from leg to leg [rad], and how far
+# from the end of one the next one begins at most, in x and y [mm].
+LETTERING = ((5, 80), (0.0001, 0.015), 1200, 0.35, 0.4)
+DRAWING = ((3, 30), (0.3, 3.0), 3000, 0.5, 50.0)
 
 
 def contour(blocks: int, seed: int = 5) -> str:
@@ -71,6 +77,26 @@ def carving(blocks: int, seed: int = 7) -> str:
     return _program(STEP_FEED, np.concatenate(points)[:blocks], 5)
 
 
+def strokes(
+    blocks: int,
+    kind: tuple[tuple[int, int], tuple[float, float], int, float, float],
+    seed: int = 1,
+) -> str:
+    """An NC program of strokes of one kind, lifted between them."""
+    (least, most), length, feed, bend, far = kind
+    rng, point, lines = np.random.default_rng(seed), np.zeros(2), list[str]()
+    while len(lines) < blocks:
+        point = point + rng.uniform(-far, far, 2)
+        lines += ["G0 Z0.5", f"G0 X{point[0]:.5f} Y{point[1]:.5f}", "G1 Z-0.05"]
+        legs = int(rng.integers(least, most))
+        heading = rng.uniform(0.0, 2.0 * np.pi) + np.cumsum(rng.normal(0.0, bend, legs))
+        step = rng.uniform(*length, (legs, 1)) * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        along = point + np.cumsum(step, axis=0)
+        lines += [f"G1 X{x:.5f} Y{y:.5f}" for x, y in along]
+        point = along[-1]
+    return "\n".join([f"G21 G90 G17 G94 F{feed}", *lines, "G0 Z0.5", "M2", ""])
+
+
 def _program(feed: int, points: np.ndarray, digits: int) -> str:
     lines = [f"G1 X{x:.{digits}f} Y{y:.{digits}f} Z{z:.{digits}f}" for x, y, z in points]
     return "\n".join([f"G21 G90 G17 G94 F{feed}", *lines, "M2", ""])
@@ -92,6 +118,8 @@ JOBS = {
     "mmount": Job("LinuxCNC__linuxcnc__mmount.ngc", "mill"),
     "contour, 50,000 blocks": Job(lambda: contour(50_000), "mill"),
     "carving, 120,000 blocks": Job(lambda: carving(120_000), "mill"),
+    "lettering, 12,400 blocks": Job(lambda: strokes(12_400, LETTERING), "peers.toml"),
+    "drawing, 9,600 blocks": Job(lambda: strokes(9_600, DRAWING), "peers.toml"),
     "relief, 50,000 blocks": Job(lambda: relief(50_000), "mill"),
     "relief, 50,000 blocks, peers": Job(lambda: relief(50_000), "peers.toml"),
 }

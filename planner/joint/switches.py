@@ -220,22 +220,22 @@ def _together(run: TubeRun, r: int) -> tuple[FloatArray, Array]:
     """(P, A) the points around the vertex where leg r begins that may be passed together with it, in order, and (P,) the
     legs that begin there, -1 of points on arcs."""
     vertex, reach = run.vertex[r], LOOKED_AT * run.vertex_budget[r]
-    found = [(vertex, r)]
-    for way in (-1, 1):
-        leg, most = r - 1 if way < 0 else r, len(found) + LOOKED_MOST
-        while 0 <= leg < len(run) and len(found) < most:
-            x = run.length[leg] * np.linspace(0.0, 1.0, run.marks[leg] + 1)
-            points = run.points(np.full(len(x), leg), x)
-            of = np.append(np.append(leg, np.full(len(x) - 2, -1)), leg + 1)
-            points, of = (points[-2::-1], of[-2::-1]) if way < 0 else (points[1:], of[1:])
-            near = (np.linalg.norm(points - vertex, axis=1) <= reach) & (of != 0) & (of != len(run))
-            until = len(near) if near.all() else int(near.argmin())
-            more = list(zip(points[:until], of[:until].tolist(), strict=True))
-            found = more[::-1] + found if way < 0 else found + more
-            if until < len(near):
-                break
-            leg += way
-    return np.array([point for point, _ in found]), np.array([leg for _, leg in found])
+    before, behind = np.arange(r - 1, max(r - 1 - LOOKED_MOST, -1), -1), np.arange(r, r + LOOKED_MOST)
+    points, of = [vertex[None]], [np.array([r])]
+    for legs, way in ((before, -1), (behind[behind < len(run)], 1)):
+        marks = run.marks[legs]
+        ends = np.cumsum(marks)
+        many = int(ends[ends - marks < LOOKED_MOST][-1])
+        leg, last = np.repeat(legs, marks)[:many], np.isin(np.arange(many) + 1, ends)
+        number = np.arange(many) + 1 - np.repeat(ends - marks, marks)[:many]  # from the vertex outwards
+        share = (number if way > 0 else run.marks[leg] - number) * (1.0 / run.marks[leg])
+        found = run.points(leg, run.length[leg] * np.where(last & (way > 0), 1.0, share))
+        at = np.where(last, leg + (way > 0), -1)
+        near = (np.linalg.norm(found - vertex, axis=1) <= reach) & (at != 0) & (at != len(run))
+        until = many if near.all() else int(near.argmin())
+        points.insert(way + 1, found[:until][::way])
+        of.insert(way + 1, at[:until][::way])
+    return np.concatenate(points), np.concatenate(of)
 
 
 def _too_fast(

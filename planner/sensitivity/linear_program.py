@@ -185,6 +185,39 @@ def multipliers(program, value, enough, iterations):
     return best
 
 
+def multipliers_by_part(
+    program: Programme, part: Array, size: Array, enough: float, iterations: int
+) -> FloatArray:
+    """(2, m) `multipliers` of parts that share no variable, part by part: one that takes many iterations does not hold up the
+    others, and the numbers of one stay in the processor's cache.
+
+    part   : (n,) of each variable, ascending, and of rows, by the first one of each
+    size   : (P,) of their optima, about; those whose cost is 0 have no multipliers
+    enough : up to where each is bounded, share of its size [-]
+    """
+    z = np.zeros((2, len(program.high)))
+    number = np.arange(len(size) + 1)
+    row = np.searchsorted(part[program.column[program.first[:-1]]], number).tolist()
+    at = np.searchsorted(part, number).tolist()
+    for k in np.unique(part[program.cost != 0.0]).tolist():
+        inside, rows = slice(at[k], at[k + 1]), slice(row[k], row[k + 1])
+        first = program.first[row[k] : row[k + 1] + 1]
+        entries = slice(first[0], first[-1])
+        own = Programme(
+            program.cost[inside],
+            first - first[0],
+            program.column[entries] - at[k],
+            program.value[entries],
+            program.low[rows],
+            program.high[rows],
+            program.start[inside],
+            program.reach[inside],
+            program.width,
+        )
+        z[:, rows] = multipliers(own, float(size[k]), enough * float(size[k]), iterations)
+    return z
+
+
 def bounds_by_part(program: Programme, z: FloatArray, part: Array) -> FloatArray:
     """(P,) what the optimum of each part is at least, by multipliers z (2, m).
 

@@ -30,7 +30,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.sensitivity.corner_speeds import Legs, legs_between
-from planner.sensitivity.linear_program import Programme, bounds_by_part, multipliers
+from planner.sensitivity.linear_program import Programme, bounds_by_part, multipliers_by_part
 from planner.sensitivity.sampled_rows import (
     Layout,
     Lines,
@@ -109,7 +109,7 @@ def chain_times(run: Way, sampled: Sampled, chains: Array, y: FloatArray) -> Flo
     part = at.part[at.gap]
     fixed = np.bincount(part, lines.front[:, -1] + lines.back[:, -1])
     total = fixed + np.bincount(part, programme.start[at.gap])
-    z = multipliers(programme, float(total.sum()), ENOUGH * float(total.sum()), ITERATIONS)
+    z = multipliers_by_part(programme, at.part, total, ENOUGH, ITERATIONS)
     # what motions with a longer tau than the programme's reach take is not below this
     within = np.abs(outer).sum(axis=(0, 2)) * lines.way.tolerance.max()
     return np.minimum(fixed + bounds_by_part(programme, z, at.part), total - within)
@@ -141,15 +141,20 @@ def programme_of(
     axis = np.arange(way.point.shape[1])
     cost[at.waypoint[lines.begins][:, None] + axis] += outer[0]
     cost[at.waypoint[lines.ends][:, None] + axis] -= outer[1]
-    reach = _reach(lines, at)
-    total = start[at.gap].sum() + (lines.front[:, -1] + lines.back[:, -1]).sum()
-    reach[at.gap] = 2.0 * (total + np.abs(outer).sum() * way.tolerance.max())
+    reach, part = _reach(lines, at), at.part[at.gap]
+    total = np.bincount(part, start[at.gap] + lines.front[:, -1] + lines.back[:, -1])
+    reach[at.gap] = 2.0 * (total + np.abs(outer).sum(axis=(0, 2)) * way.tolerance.max())[part]
     return lines, at, outer, rows.programme(cost, start, reach)
 
 
 def _reach(lines: Lines, at: Layout) -> FloatArray:
-    """(n,) how far samples are from their waypoints at most: they are beside their line."""
-    return np.full(len(at.part), lines.way.length.max() + 2.0 * lines.way.tolerance.max())
+    """(n,) how far samples are from their waypoints at most: they are beside their line. What reaches further lowers the bound
+    by more of what rounding leaves of the residual, and takes more iterations."""
+    way, window, reach = lines.way, lines.window, np.zeros(len(at.part))
+    far = way.length + 2.0 * np.maximum(way.tolerance[window], way.tolerance[window + 1])
+    for first in (at.front, at.back, at.waypoint[window, None], at.waypoint[window + 1, None]):
+        reach[first[..., None] + np.arange(way.point.shape[1])] = far[:, None, None]
+    return reach
 
 
 def _coordinates(way: Way, bounds: Bounds) -> tuple[FloatArray, FloatArray, Bounds]:
@@ -207,7 +212,7 @@ def ends_at_corners(
         cost = np.zeros(n)
         cost[variables] = -middle[..., None] * (direction / unit[:, None])[:, None]
         programme = free._replace(cost=cost)
-        z = multipliers(programme, float(len(line)), NEAR * len(line), ITERATIONS)
+        z = multipliers_by_part(programme, window, np.ones(window[-1] + 1), NEAR, ITERATIONS)
         found = -bounds_by_part(programme, z, window)[window[at.waypoint[inner]]] * unit
         found += np.abs(direction) @ way.limit[2] * h * h_behind / 6.0
         speed[line] = np.minimum(speed[line], np.maximum(found, 0.0))

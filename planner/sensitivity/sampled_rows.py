@@ -79,12 +79,13 @@ class Rows:
         self.count += len(column)
 
     def programme(self, cost: FloatArray, start: FloatArray, reach: FloatArray) -> Programme:
-        """All rows, with `cost`, `start` and `reach` (n,)."""
+        """All rows, by their first variable, with `cost`, `start` and `reach` (n,)."""
         row, column, value = (np.concatenate(of) for of in zip(*self.entries, strict=True))
-        order = np.lexsort((column, row))
+        least = np.minimum.reduceat(column, np.searchsorted(row, np.arange(self.count)))
+        order = np.lexsort((column, row, least[row]))
         row, column, value = row[order], column[order], value[order]
-        first = np.searchsorted(row, np.arange(self.count + 1))
-        low, high = (np.concatenate(of) for of in zip(*self.bounds, strict=True))
+        first = np.append(np.flatnonzero(np.diff(row, prepend=-1)), len(row))
+        low, high = (np.concatenate(of)[row[first[:-1]]] for of in zip(*self.bounds, strict=True))
         width = int((column[first[1:] - 1] - column[first[:-1]]).max()) + 1
         return Programme(cost, first, column, value, low, high, start, reach, width)
 

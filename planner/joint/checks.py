@@ -203,8 +203,9 @@ def worst_shares(keeps, leg, h, state, jerk, place):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def chord_means(keeps, leg, h, state, jerk):
-    """(N+1, A) the middles of the chords, behind filters, that are there when the motion is at the nodes; (N+1,) by how much
-    chords that pass a vertex at another place than their middle are farther from it. Arguments as above."""
+    """(N+1, A) the middles of the chords, behind filters, that are there when the motion is at the nodes, at a vertex p + dt^2/8 a
+    of eq. (18) where that is farther from it; (N+1,) by how much chords that pass a vertex at another place than their middle
+    are farther from it. Arguments as above."""
     nodes, axes = len(state), jerk.shape[1]
     point, tangent, bend, other = np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(axes)
     node, mean, wider = np.append(0.0, np.cumsum(h)), np.zeros((nodes, axes)), np.zeros(nodes)
@@ -216,6 +217,10 @@ def chord_means(keeps, leg, h, state, jerk):
                 other[:] = 0.0
                 _add_chord(keeps, node, state, jerk, node[i], side, other)
                 wider[i] = max(wider[i], _apart(other, point, tangent, 0.0))
+            for k in range(axes):
+                other[k] = state[i, 0, k] + 0.5 * keeps.chord * keeps.chord * state[i, 2, k]
+            if _apart(other, point, tangent, 0.0) > _apart(mean[i], point, tangent, 0.0):
+                mean[i] = other
             wider[i] = max(wider[i] - _apart(mean[i], point, tangent, 0.0), 0.0)
     return mean, wider
 

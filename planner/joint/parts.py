@@ -28,6 +28,7 @@ class FoundRun:
     kept: Array | None = None  # (N,) steps that stand for the motion of the start; None for none
     # (N, 3 A + 5) what the limits of each step cost (price.py) [s]; None where the solver does not tell
     price: FloatArray | None = None
+    coarser: "FoundRun | None" = None  # what the search in longer steps had found, which this began with
 
     @property
     def whole(self) -> bool:

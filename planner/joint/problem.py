@@ -27,6 +27,9 @@ STEP_SHARE = 0.95
 # exp(i w t), tau = dt/2, and rows 1 - SEEN (w tau)^2/2. With this both are 0 at w tau = pi/2, their ratio is between 0 and 1 up to
 # 3 pi/2, and what is told comes to rest; with 1 it does not between 1.33 and 1.57.
 SEEN = 8.0 / np.pi**2
+# The rest is of the durations at which it was found: instead of `LONGER` [-]. With that windows go on to the last iteration, or
+# end where chords are farther off than before.
+LONGER_TOLD = 2.0
 # What chords leave of the room of a node at a vertex at least [-].
 LEAST_ROOM = 0.2
 
@@ -91,7 +94,7 @@ def window_of(
     jerks = np.diff(state[:, 2], axis=0) / h[:, None]
     place = np.tile((cut.place[part, :3] - run.offset[leg][:, None]) / length, rows.SETS)
     beside = no_rows_beside(len(leg), len(run.axis)) if beside is None else beside
-    sag = run.sag if rest is None else SEEN * run.sag
+    sag, longer = (run.sag, LONGER) if rest is None else (SEEN * run.sag, LONGER_TOLD)
     rest = np.zeros((len(leg) + 1, len(run.axis) + 1)) if rest is None else rest / length
     rest, less = rest[:, :-1], rest[:-1, -1]
     limits = _limits(run, cut, units, (missed, tight), laws, smooth, beside)
@@ -102,6 +105,8 @@ def window_of(
             sag=np.array([0.0, sag / second**2]),
             rest=np.stack([rest[:-1], rest[1:]], axis=1),
             room_node=np.maximum(limits.room_node - less, LEAST_ROOM * limits.room_node),
+            h_max=limits.h * longer,
+            h_min=limits.h / longer,
         ),
         x=x,
         u=np.column_stack([jerks / jerk, h / second]),
@@ -213,8 +218,8 @@ def _limits(
         step_max=STEP_SHARE * np.where(curved, np.minimum(run.step_max[leg], run.offset[-1]), 1.0) / length,
         pace=own_pace / speed,
         h=h,
-        h_max=h * LONGER,
-        h_min=h / LONGER,
+        h_max=np.empty(0),
+        h_min=np.empty(0),
         switch=np.where(of_switch >= 0, run.switch[of_switch], 0.0),
         switch_at=(switch_at - units.origin) / length,
         side=side,

@@ -36,7 +36,7 @@ from planner.planning.job.by_run import RunsInTime, full_stops
 from planner.planning.job.job import Job
 from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
-from planner.planning.job.runs_alone import ALONE_MOST, with_runs_alone
+from planner.planning.job.runs_alone import ALONE_MOST, Alone, with_runs_alone
 from planner.planning.joint_start import Start
 from planner.planning.optimal.effort import Search, Settings
 from planner.planning.optimal.notes import path_notes
@@ -119,17 +119,23 @@ def joint_plan(
             job.tell("search", steps=steps, of=most)
             return Joint(None, steps)
         found = searched_runs(runs, start, search.of(steps), report, stays=stays)
-    made = None
-    if any(one.whole or (stays and one.steps) for one in found):
-        parts = [_parts(job, one, start.spliced(k), stays=stays) for k, one in enumerate(found)]
-        made = with_runs_alone(
-            job,
-            parts,
-            others.alone,
-            ALONE_MOST,
-            settings.not_limited,
-            kept=lambda: None if (path := others.kept(job)) is None else RunsInTime(path[1], job),
-        )
+    made, looked = None, found
+    while looked and (made is None or made.delivered.slower):
+        if any(one.whole or (stays and one.steps) for one in looked):
+            parts = [_parts(job, one, start.spliced(k), stays=stays) for k, one in enumerate(looked)]
+            other = with_runs_alone(
+                job,
+                parts,
+                others.alone,
+                ALONE_MOST,
+                settings.not_limited,
+                kept=lambda: None if (path := others.kept(job)) is None else RunsInTime(path[1], job),
+            )
+            if other is not None and (made is None or _time(other) < _time(made)):
+                made, found = other, looked
+        # shorter steps find what the verdict refuses where longer ones did not: more effort takes no more time
+        coarser = any(one.coarser for one in looked)
+        looked = [one.coarser or one for one in looked] if coarser else []
     slower = made.delivered.slower if made else None
     time = made.delivered.trajectory.cycle_time if made and not slower else np.nan
     count, kept = len(made.plans) if made else 0, made is not None and slower is None
@@ -164,6 +170,10 @@ def joint_plan(
         notes=(*made.notes, *path_notes(job.toolpath, planned, _stays(job, found, made.plans)), *notes),
     )
     return Joint(plan, steps) if slower is None else Joint(None, steps, slower=plan)
+
+
+def _time(made: Alone) -> float:
+    return (made.delivered.slower or made.delivered).trajectory.cycle_time
 
 
 def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list[SplicedRun] | None:
@@ -230,32 +240,37 @@ def search_run(
     """The solution of the search along run k; of no use if it takes as long as `within` [s]."""
     if run.left:
         return FoundRun(run, Status.ACCEPTABLE, run.left)
-    guess = start.guess(k, run)
     if isinstance(solver, InTwo):
-        guess, solution = yield from _in_two(k, run, start, solver)
+        taken = yield from _in_two(k, run, start, solver)
     else:
-        solution = yield from search_with(solver, run, guess)
-    steps = solution.steps
-    if steps is None:
-        return FoundRun(run, Status.ACCEPTABLE, solution.sentence)
-    if steps.h.sum() >= within:
-        return FoundRun(run, Status.ACCEPTABLE, "the search did not end faster than its start")
-    times = start.departure[k] + np.append(0.0, np.cumsum(guess.h))
-    return FoundRun(
-        run, solution.status, solution.sentence, steps, solution.place, times, solution.kept, solution.price
-    )
+        guess = start.guess(k, run)
+        taken = [(guess, (yield from search_with(solver, run, guess)))]
+    found = FoundRun(run, Status.ACCEPTABLE, taken[-1][1].sentence)
+    for guess, solution in taken:
+        steps = solution.steps
+        if steps is None:
+            continue
+        if steps.h.sum() >= within:
+            found = FoundRun(run, Status.ACCEPTABLE, "the search did not end faster than its start")
+            continue
+        times = start.departure[k] + np.append(0.0, np.cumsum(guess.h))
+        of_steps = solution.place, times, solution.kept, solution.price
+        coarser = None if found.steps is None else found
+        found = FoundRun(run, solution.status, solution.sentence, steps, *of_steps, coarser)
+    return found
 
 
-def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> Searching[tuple[Guess, TubeSolution]]:
-    """The steps from which the last search began, and its solution."""
+def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> Searching[list[tuple[Guess, TubeSolution]]]:
+    """The steps from which each search began whose motion was taken, and its solution, the last one in the shortest steps."""
     guess = start.guess(k, run)
     found = yield from solver.first.search(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
         if not solver.finer:
-            return guess, found
+            return [(guess, found)]
         cut, own = solver.finer[0]
         guess = start.guess_in(k, run, cut)
-        return guess, (yield from own.search(run, guess))
+        return [(guess, (yield from own.search(run, guess)))]
+    taken = [(guess, found)]
     for cut, own in solver.finer:
         finer = divided(run, guess.leg, found, cut)
         again = yield from searched_again(run, found, finer, own)
@@ -263,7 +278,8 @@ def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> Searching[tupl
             continue
         if own.smooth or again.steps.h.sum() <= found.steps.h.sum():
             guess, found = finer.guess, again
-    return guess, found
+            taken.append((guess, found))
+    return taken
 
 
 def tabled(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import planner
+from benchmarks.jobs import random_lines
 from planner.base.threads import use_threads
 from planner.delivery import mending
 from planner.feedrate.solution import Status
@@ -221,3 +222,13 @@ def test_a_plan_that_may_pass_with_less_tolerance_keeps_the_other_beside_it(
     assert kept.slower_in_places().cycle_time == mended.cycle_time
     assert beside(best, mended, job).slower_in_places().cycle_time == mended.cycle_time
     assert beside(slower, mended, job) is mended
+
+
+def test_more_effort_takes_no_more_time_where_shorter_steps_are_refused() -> None:
+    program, machine = random_lines.job(28)
+    traces = {effort: Trace() for effort in ("quick", "normal")}
+    plans = [planner.plan(program, machine, effort=effort, log=trace) for effort, trace in traces.items()]
+    assert plans[1].verdict is not None
+    assert plans[1].verdict.passed
+    assert plans[1].cycle_time <= (1.0 + 1e-9) * plans[0].cycle_time
+    assert [step.kept for step in traces["normal"].steps if step.name == "search"] == [True]

@@ -1,6 +1,6 @@
 """The models behind `planner time` against the controls' own planners, on real programs.
 
-    python -m benchmarks.controls.control_times --peers FOLDER --klippy FOLDER [--only PART_OF_NAME ...]
+    python -m benchmarks.controls.control_times --peers FOLDER --klippy FOLDER [--user NAME] [--only PART_OF_NAME ...]
 
 LinuxCNC 2.9 is its own interpreter and planner (tpmod.so), which `lcnc_fast.py` in --peers steps one servo period at a time
 (a copy of ../shared/peers with the compiled `tp_harness`); it reads the file itself, with G64 P0.05 Q0. Klipper is its own
@@ -50,11 +50,16 @@ WAYS: dict[str, tuple[str, dict[str, Any]]] = {
 GOOD = 2.0  # [%]
 
 
-def on_linuxcnc(peers: Path, file: Path) -> float | None:
-    """Time of a program on LinuxCNC without its dwells [s]; None where LinuxCNC does not read it."""
+def on_linuxcnc(peers: Path, file: Path, user: str | None = None) -> float | None:
+    """Time of a program on LinuxCNC without its dwells [s]; None where LinuxCNC does not read it.
+
+    user : who runs all of LinuxCNC, in real time, for programs with splines: lcnc_fast.py makes other lines of them than
+           LinuxCNC makes arcs; None for lcnc_fast.py
+    """
     command = [
+        *(("runuser", "-u", user, "--") if user else ()),
         "/usr/bin/python3",
-        str(peers / "lcnc_fast.py"),
+        str(peers / ("linuxcnc_run.py" if user else "lcnc_fast.py")),
         str(file),
         "--tol",
         f"{TOLERANCE}",
@@ -63,10 +68,13 @@ def on_linuxcnc(peers: Path, file: Path) -> float | None:
     ]
     command += ["--vmax", "100", "--amax", "2000"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    return None if done.returncode else float(json.loads(done.stdout)["cycle_time"])
+    name = "cycle_time_s" if user else "cycle_time"
+    return None if done.returncode else float(json.loads(done.stdout)[name])
 
 
-def row_of(file: Path, program: Program, machine: Machine, peers: Path, klippy: Path) -> dict[str, Any]:
+def row_of(
+    file: Path, program: Program, machine: Machine, peers: Path, klippy: Path, user: str | None
+) -> dict[str, Any]:
     """Predicted and own times of a program [s], by control, and the CPU time of the slowest prediction."""
     toolpath = toolpath_from_program(program, machine, TOLERANCE)
     row: dict[str, Any] = {"program": file.name.split("__")[-1], "blocks": len(program), "cpu_s": 0.0}
@@ -95,7 +103,9 @@ def row_of(file: Path, program: Program, machine: Machine, peers: Path, klippy: 
             more = {"along": np.inf, "deviation": control.junction_deviation, "jump": jump}
             own = buffered(name, points, feed, stop, limits | more)
         row[way] = {"predicted": predicted, "own": own}
-    own = None if len(program.synchronised) else on_linuxcnc(peers, file)
+    own = None
+    if not len(program.synchronised):
+        own = on_linuxcnc(peers, file, user if len(program.splines) else None)
     for name in times.TIMED:
         begin = time.process_time()
         found = times.control_times(program, machine, name, TOLERANCE)
@@ -116,6 +126,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--peers", type=Path, required=True)
     parser.add_argument("--klippy", type=Path, required=True)
+    parser.add_argument("--user", help="ordinary user, who can read --peers, for programs with splines")
     parser.add_argument("--only", nargs="+", default=[])
     options = parser.parse_args()
     machine, rows = load_machine(SHARED / "machines" / "peers.toml"), []
@@ -126,7 +137,7 @@ def main() -> None:
             begin = time.process_time()
             program = planner.read_program(file, machine, planner.Reading(extruder="ignore"))
             read = time.process_time() - begin
-            row = row_of(file, program, machine, options.peers, options.klippy)
+            row = row_of(file, program, machine, options.peers, options.klippy, options.user)
         except planner.InputError:
             continue
         row["cpu_s"] += read

@@ -37,6 +37,8 @@ from planner.nc.program import MOVES, Kind, PathControl, Program
 COLLINEAR_ANGLE = 1e-8
 # Coordinates beyond this are certainly a mistake, ten kilometres [mm]; beyond 1e9 float64 loses the micrometre.
 COORDINATE_MAX = 1e7
+# Speeds that differ by less are the same [-]: rounding.
+SAME_SPEED = 1e-9
 # A move shorter than this goes nowhere [mm]: a picometre, the rounding of coordinates around 1e3 mm.
 ZERO_LENGTH = 1e-9
 
@@ -115,7 +117,7 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         extrusion=extrusion,
     )
     require_room(toolpath, machine)
-    return toolpath
+    return _in_motion(toolpath, program, machine, laid) if any(program.speeds) else toolpath
 
 
 def _measured(program: Program, radius: float) -> Program:
@@ -298,6 +300,25 @@ def path_per_length(axes: tuple[str, ...], radius: float, laid: _Laid | Toolpath
     by = np.where(linear > ZERO_LENGTH, linear, np.where(parallel > ZERO_LENGTH, parallel, rotary / radius))
     per: FloatArray = laid.length / by
     return per
+
+
+def _in_motion(toolpath: Toolpath, program: Program, machine: Machine, laid: _Laid) -> Toolpath:
+    """The path with the speeds at which the program begins and ends. Raises InputError for one above the feed there or the
+    limit of an axis."""
+    more = len(program.axes) > len(LINEAR_AXES)
+    per = path_per_length(program.axes, machine.radius, laid)[[0, -1]] if more else np.ones(2)
+    begin, end = program.speeds * per
+    toolpath = dataclasses.replace(toolpath, speeds=(float(begin), float(end)))
+    limits = machine.limits("velocity", toolpath.axes)
+    for k, name in ((0, "start"), (-1, "end")):
+        shares = np.append(np.abs(toolpath.velocities[k]) / limits, toolpath.speeds[k] / toolpath.feed[k])
+        worst = int(shares.argmax())
+        if shares[worst] > 1.0 + SAME_SPEED:
+            by = ("the axis " + toolpath.axes[worst].upper()) if worst < len(limits) else "the feed there"
+            asked, most = program.speeds[k], program.speeds[k] / shares[worst]
+            said = f"{name} speed {asked:g} mm/s: {by} allows {most:.6g} mm/s"
+            raise InputError(said, source=program.source)
+    return toolpath
 
 
 def _exact(program: Program, block: Array, joint: Array) -> Array:

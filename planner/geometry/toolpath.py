@@ -97,6 +97,8 @@ class Toolpath:
     zero_length     : (Z,) blocks that move nowhere, kept as events
     radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths
     extrusion       : what the extruder does along it; None without one
+    speeds          : along the path at its first and its last joint [mm/s], with no acceleration: 0 for rest; the limits
+                      of the axes and the feeds beside them allow them
     inside          : (M,) `along` over the smaller tolerance of the segment's ends [-], where joints were
                       given less of it (delivery/periods.py); None for 1
     """
@@ -126,6 +128,7 @@ class Toolpath:
     zero_length: Array
     radius: float = 1.0
     extrusion: Extrusion | None = None
+    speeds: tuple[float, float] = (0.0, 0.0)
     inside: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -198,6 +201,44 @@ class Toolpath:
         corner would be a cusp there, rests at the vertex. The program does not ask for it."""
         back = (self.joint == Joint.CORNER) & (self.theta > REVERSAL_ANGLE)
         return self.with_joints(back, Joint.STOP) if back.any() else self
+
+    @property
+    def velocities(self) -> FloatArray:
+        """(2, A) at the first and the last joint [mm/s]."""
+        tangents = np.stack([self.tangent_start[0], self.tangent_end[-1]])
+        return np.asarray(np.array(self.speeds)[:, None] * tangents)
+
+    @property
+    def rests(self) -> Array:
+        """(M+1,) True at full stops: the ends are none where the path begins and ends in motion."""
+        rests: Array = self.joint == Joint.STOP
+        rests[[0, -1]] = np.equal(self.speeds, 0.0)
+        return rests
+
+    def with_leads(self, lengths: tuple[float, float]) -> Toolpath:
+        """The path with a straight way before its begin and behind its end, from rest and to rest, which are run at no
+        more than the speeds there. lengths : [mm]; 0 for none"""
+        before, behind = (length > 0.0 for length in lengths)
+        columns: dict[str, Any] = {}
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray) and field.name != "zero_length":
+                sides = [(int(before), int(behind)), *[(0, 0)] * (value.ndim - 1)]
+                columns[field.name] = np.pad(value, sides, mode="edge")
+        for k, joint in [(0, 1)] * before + [(-1, -2)] * behind:
+            columns["length"][k], columns["feed"][k] = lengths[k], self.speeds[k]
+            columns["curvature"][k], columns["arc"][k], columns["curve"][k] = 0.0, -1, -1
+            columns["tangent_start"][k] = columns["tangent_end"][k] = (
+                self.tangent_start[0] if k == 0 else self.tangent_end[-1]
+            )
+            columns["joint"][joint] = Joint.SMOOTH
+        if before:
+            columns["start"][0] = self.start[0] - lengths[0] * self.tangent_start[0]
+            columns["end"][0] = self.start[0]
+        if behind:
+            columns["start"][-1] = self.end[-1]
+            columns["end"][-1] = self.end[-1] + lengths[1] * self.tangent_end[-1]
+        return dataclasses.replace(self, speeds=(0.0, 0.0), **columns)
 
     def part(self, kept: Array) -> Toolpath:
         """The segments `kept` (M,) one after the other, all of what lies between two full stops or none of

@@ -90,14 +90,13 @@ class CutMotion:
 def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut = DEFAULT_CUT) -> Guess:
     """Cut a motion along a run of R legs into steps.
 
-    motion      : along this run alone, at rest at both ends
+    motion      : along this run alone; at its ends the run's velocities are put in its place
     vertex_time : (R+1,) when it passes the vertices [s], strictly ascending
     """
     leg, nodes = _steps(run, motion, vertex_time, cut)
     of_axes = (getattr(motion, name)[:, run.axis] for name in ("position", "velocity", "acceleration"))
     state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
-    state[[0, -1], 1:] = 0.0
-    state[[0, -1], 0] = run.vertex[[0, -1]]
+    state[[0, -1]] = np.stack([run.vertex[[0, -1]], run.ends, 0.0 * run.ends], axis=1)
     h = np.diff(nodes)
     place = _places(run, leg, h, state, np.interp(nodes, motion.t, motion.s))
     return Guess(leg=leg, h=h, state=state, place=place)

@@ -213,7 +213,7 @@ def _present(laws: LawRows, window: Window, free: Array) -> Array:
     direction."""
     on = np.ones((window.hi - window.lo, laws.first[-1]), dtype=bool)
     lo, hi, steps = window.lo, window.hi, len(window)
-    begins, ends = lo == 0, hi == steps
+    begins, ends = (node in (0, steps) and not window.state[node, 1].any() for node in (lo, hi))
     vertex = np.diff(window.leg[lo:hi], prepend=window.leg[max(lo - 1, 0)]) > 0
     for m, kind in enumerate(laws.kind):
         own = on[:, laws.first[m] : laws.first[m + 1]]

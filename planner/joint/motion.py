@@ -24,7 +24,7 @@ MEASURED_AT = np.linspace(0.0, 1.0, 257)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Steps:
-    """N steps of constant jerk over A axes, from rest to rest.
+    """N steps of constant jerk over A axes, along a run.
 
     h                                    : (N,) duration [s]
     position, velocity, acceleration     : (N, A) at the start of each
@@ -44,8 +44,7 @@ def steps_of(run: TubeRun, guess: Guess, h: FloatArray, jerk: FloatArray) -> Ste
 
     guess : what the search began with
     """
-    begin, end = (np.zeros((3, len(run.axis))) for _ in range(2))
-    begin[0], end[0] = run.vertex[0], run.vertex[-1]
+    begin, end = np.stack([run.vertex[[0, -1]], run.ends, 0.0 * run.ends], axis=1)
     jerk = closed(begin, end, h, jerk)
     p, v, a = np.moveaxis(integrated(begin, h, jerk)[:-1], 1, 0)
     steps = Steps(h=h, position=p, velocity=v, acceleration=a, jerk=jerk)

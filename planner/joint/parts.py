@@ -59,13 +59,14 @@ def parts_of(toolpath: Toolpath, found: FoundRun, start: SplicedRun) -> list[Spl
     steps = len(found.steps.h)
     parts = []
     for lo, hi, stays in found.ranges():
+        goes_on = hi < steps or bool(found.run.ends[1].any())
         if stays:
             begin = start.begin if lo == 0 else float(found.times[lo])
             end = start.end if hi == steps else float(found.times[hi])
-            parts.append(SplicedRun(motion=start.motion, begin=begin, end=end, moving=hi < steps))
+            parts.append(SplicedRun(motion=start.motion, begin=begin, end=end, moving=goes_on))
         else:
             motion = _motion(toolpath, found, lo, hi)
-            parts.append(SplicedRun(motion=motion, begin=0.0, end=motion.end, moving=hi < steps))
+            parts.append(SplicedRun(motion=motion, begin=0.0, end=motion.end, moving=goes_on))
     return parts
 
 

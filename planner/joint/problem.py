@@ -173,8 +173,8 @@ def _limits(
     for step, node in (
         (0, lo),
         (-1, hi),
-    ):  # where a run begins or ends, the middle ordinates of the velocity and of a x v are 0 for every motion
-        if node in (0, len(cut)):
+    ):  # where a run is at rest, the middle ordinates of the velocity and of a x v are 0 for every motion
+        if node in (0, len(cut)) and not cut.state[node, 1].any():
             more = on[step, 8 * len(run.axis) :]
             more[rows.ORDER_MID] = more[rows.NORMAL_ROWS : rows.LAW_ROWS] = False
     passed = run.passed[leg]

@@ -48,7 +48,7 @@ def divided(run: TubeRun, leg: Array, found: TubeSolution, cut: Cut) -> Divided:
     state[:-1, 0] = p + t * (v + t * (a / 2 + t * j / 6))
     state[:-1, 1] = v + t * (a + t * j / 2)
     state[:-1, 2] = a + t * j
-    state[-1, 0] = run.vertex[-1]
+    state[-1, :2] = run.vertex[-1], run.ends[1]
     nodes = np.append(place[of] + (np.diff(place) / parts)[of] * number, place[-1])
     places = nodes[:-1, None] + np.diff(nodes)[:, None] * np.linspace(0.0, 1.0, 4)
     return Divided(Guess(leg=leg[of], h=h, state=state, place=places), parts)

@@ -45,6 +45,9 @@ from planner.machine.user_limit import QUANTITIES
 # Fraction of the budget that a step on an arc or a curve may use for what that is off its own cubic [-], and
 # the largest angle that it turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
+# Of a limit, how far below it a run begins or ends in motion at most [-]: rows are narrowed by 2e-6 (problem.py), and where both
+# ends are at the feed nothing else is left for a search to be in.
+BELOW = 4e-6
 STRAIGHT = 1e-6  # differences of directions that count as one [-]
 _AS_IT_IS = np.array([[0.0, 1.0]])  # `TubeRun.lag` without filters
 # Without limits of the jerk the scale of steps, as a share of the time in which the full acceleration moves an
@@ -59,7 +62,7 @@ TOGETHER = 2.0  # vertices may be passed together that are so many tolerances ap
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TubeRun:
-    """R legs from rest to rest over the A axes that move on them, and the R+1 vertices around them.
+    """R legs from rest to rest, or as `ends` says, over the A axes that move on them, and the R+1 vertices around them.
 
     axis                         : (A,) their indices among the axes of the toolpath
     first                        : (R+1,) leg r holds the toolpath's segments first[r] : first[r+1]
@@ -73,6 +76,7 @@ class TubeRun:
     across_max                   : (R,) largest normal acceleration that the machine allows [mm/s2]; inf where
                                    the axes cannot exceed it
     vertex, vertex_budget        : (R+1, A), (R+1,) [mm]; the budget is 0 at both ends
+    ends                         : (2, A) velocity where it begins and ends [mm/s], with no acceleration
     sag                          : how far the middles of chords between setpoints, behind filters, are from the motion per
                                    acceleration [s2]
     lag                          : (K, 2) times and weights of which filters behind the setpoints are the mean [s], [-]
@@ -102,6 +106,7 @@ class TubeRun:
     across_max: FloatArray
     vertex: FloatArray
     vertex_budget: FloatArray
+    ends: FloatArray
     sag: float
     lag: FloatArray
     chord: float
@@ -126,6 +131,7 @@ class TubeRun:
             freeze(self, name, np.float64, (legs, axes))
         freeze(self, "vertex", np.float64, (legs + 1, axes))
         freeze(self, "vertex_budget", np.float64, (legs + 1,))
+        freeze(self, "ends", np.float64, (2, axes))
         freeze(self, "lag", np.float64, (None, 2))
         for name in ("velocity", "acceleration", "counts"):
             freeze(self, name, np.float64, (axes,))
@@ -242,6 +248,9 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
     (of_legs, of_vertices), shares = budgets_of(toolpath, edges), word_shares(toolpath)
     sag, chord = filter_rate(machine) + chord_rate(machine), float(np.sqrt(2.0 * chord_rate(machine)))
     normal, lag = largest_normal(machine), _lag(machine)
+    ends, feeds = toolpath.velocities, toolpath.feed[[0, -1]]
+    share = np.maximum(np.array(toolpath.speeds) / feeds, (np.abs(ends) / limits.velocity).max(axis=1))
+    ends /= np.maximum(share / (1.0 - BELOW), 1.0)[:, None]
     for begin, end in pairwise(stops.tolist()):
         first = edges[begin : end + 1]
         row = first[:-1]  # the segment that stands for its leg
@@ -274,6 +283,7 @@ def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = T
             across_max=np.full(len(row), normal if held else np.inf),
             vertex=vertex[:, moves],
             vertex_budget=vertex_budget,
+            ends=ends[:, moves] * [[begin == 0], [end == len(edges) - 1]],
             sag=0.0 if straight else sag,
             lag=_AS_IT_IS if straight else lag,
             chord=0.0 if straight else chord,

@@ -108,6 +108,38 @@ class Machine(Record):
         except ValidationError as fault:
             raise InputError(faults_in_words(fault, _KEYS)) from None
 
+    @classmethod
+    def of(
+        cls,
+        axes: str,
+        velocity: float | Sequence[float],
+        acceleration: float | Sequence[float],
+        jerk: float | Sequence[float],
+        **others: Any,
+    ) -> Machine:
+        """A machine in one line: `Machine.of("xyz", 500.0, 4000.0, 100_000.0)`.
+
+        axes                         : letters of its A axes
+        velocity, acceleration, jerk : one for all axes, or (A,) [mm/s, mm/s2, mm/s3; of rotary axes in degrees]
+        others                       : further fields; a period of 1 ms, a tolerance of 0.02 mm and the name "machine" unless given
+
+        Raises InputError as `Machine` does, and where there are not as many limits as axes.
+        """
+        limits = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+        columns = {}
+        for name, given in limits.items():
+            values = np.asarray(given, dtype=np.float64)
+            if values.shape not in ((), (len(axes),)):
+                raise InputError(
+                    f"{name}: {values.size} limits for the axes '{axes}'; give one, or one for each"
+                )
+            columns[name] = np.broadcast_to(values, len(axes)).tolist()
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        if len(set(axes)) < len(axes):
+            raise InputError(f"axes '{axes}': give each letter once")
+        given_axes = dict(zip(axes, rows, strict=True))
+        return cls(**{"name": "machine", "dt": 0.001, "tolerance": 0.02, "axes": given_axes, **others})
+
     @model_validator(mode="before")
     @classmethod
     def _angle_as_radius(cls, data: Any) -> Any:

@@ -34,7 +34,7 @@ def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
     A motion with as many standstills as full stops passes the joints between two of these between them.
     """
     stop = np.flatnonzero(toolpath.joint == Joint.STOP)
-    begin, end = _standing(motion)
+    begin, end = _standing(motion, toolpath)
     if len(begin) != len(stop) or len(stop) == 2:
         stop, begin = np.array([0, len(toolpath)]), np.array([0, len(motion) - 1])
         end = begin
@@ -77,7 +77,7 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     motion : sampled at the ends of its pieces too
     times  : (M+1,) when it passes the joints, from `passing_times`
     """
-    begin, end = _standing(motion)
+    begin, end = _standing(motion, toolpath)
     count = end - begin + 1
     still = np.repeat(end + 1 - np.cumsum(count), count) + np.arange(count.sum())
     rest = np.repeat(np.arange(len(begin)), count)
@@ -89,9 +89,11 @@ def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tu
     return motion.t[begin[at]], motion.t[end[at]]
 
 
-def _standing(motion: Trajectory) -> tuple[Array, Array]:
-    """(n,) the first and the last sample of each time that the motion stands still."""
-    still = np.flatnonzero(motion.feed <= STANDING * motion.feed.max())
+def _standing(motion: Trajectory, toolpath: Toolpath) -> tuple[Array, Array]:
+    """(n,) the first and the last sample of each time that the motion stands still, or of an end in motion."""
+    stands = motion.feed <= STANDING * motion.feed.max()
+    stands[[0, -1]] |= np.greater(toolpath.speeds, 0.0)
+    still = np.flatnonzero(stands)
     new = np.diff(still) > 1
     return still[np.append(True, new)[: len(still)]], still[np.append(new, True)[: len(still)]]
 

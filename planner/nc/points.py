@@ -2,8 +2,8 @@
 are no NC program.
 
 The file is JSON: `format` "points", `axes`, `points` (n+1 rows) [mm, rad], `feed` (n) [mm/s] with null for rapid
-moves, `tolerance` [mm] or null, and `curves`, the columns of a `SplineTable`, where moves are none that go
-straight. Numbers are written so that they read back exactly.
+moves, `tolerance` [mm] or null, `curves`, the columns of a `SplineTable`, where moves are none that go
+straight, and `speeds` [mm/s], where they are not 0. Numbers are written so that they read back exactly.
 """
 
 import dataclasses
@@ -70,6 +70,8 @@ def points_file(program: Program) -> bytes:
         "feed": [value if np.isfinite(value) else None for value in program.feed.tolist()],
         "points": [program.start.tolist(), *program.end.tolist()],
     }
+    if any(program.speeds):
+        entries["speeds"] = program.speeds
     if len(splines):
         entries["curves"] = {name: getattr(splines, name).tolist() for name in _CURVES}
     return (json.dumps(entries) + "\n").encode("ascii")
@@ -104,16 +106,19 @@ def read_points(data: bytes, source: str) -> Program:
         feed = np.array([np.inf if value is None else value for value in entries["feed"]], dtype=np.float64)
         tolerance = None if entries["tolerance"] is None else float(entries["tolerance"])
         axes = tuple(entries["axes"])
+        begin, end = map(float, entries.get("speeds", (0.0, 0.0)))
         known = entries["format"] == _FORMAT and _are_axes(axes)
         curves = SplineTable(**entries["curves"]) if "curves" in entries else None
     except (ValueError, KeyError, TypeError, RecursionError) as fault:
         raise InputError(f"begins like a file of points, and is none: {fault!r}", source=source) from None
     good = known and position.ndim == 2 and position.shape[1] == len(axes) and len(position) > 1
     good = good and feed.shape == (len(position) - 1,) and bool(np.isfinite(position).all())
+    good = good and min(begin, end) >= 0.0 and max(begin, end) < np.inf
     if not good or not (feed > 0).all() or (tolerance is not None and not 0 < tolerance < np.inf):
         text = "begins like a file of points, and is none: format points, axes xyz..., points (n+1, A), n feeds above 0 or null"
         raise InputError(text, source=source)
     program = program_of_points(position, feed, tolerance, source, axes)
+    program = dataclasses.replace(program, speeds=(begin, end))
     if curves is None:
         return program
     if not _join(curves, position):

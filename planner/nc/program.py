@@ -204,6 +204,7 @@ class Program:
     reading      : the settings it was read with
     tool_point   : of a program of the tool's tip; None where x, y and z are those of the joints
     uncapped     : (B,) `feed` without the feed caps of `reading`, (0,) without such caps (nc/capped.py)
+    speeds       : along the path where it begins and where it ends, as `feed` counts them [mm/s]; 0 for rest
     pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
     text         : what it was read from; None for points and curves of Python
     """
@@ -238,6 +239,7 @@ class Program:
     reading: Reading = AS_USUAL
     tool_point: ToolPoint | None = None
     uncapped: FloatArray = field(default_factory=_nothing)
+    speeds: tuple[float, float] = (0.0, 0.0)
     pen: bool = False
     text: bytes | None = None
 

@@ -18,11 +18,13 @@ from planner.base.names import AUTO
 from planner.base.sizes import SIZES
 from planner.corners.budget import filters_count
 from planner.feedrate.constraints.limits import Limits
+from planner.feedrate.solution import Status
 from planner.geometry.legs import legs_of
 from planner.planning.attempt import Attempt, Tried
 from planner.planning.job.choice import better, counted_time, faster
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
+from planner.planning.joint_leads import with_leads
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.stop import StopMethod
 from planner.planning.optimal.effort import Settings
@@ -42,6 +44,7 @@ LEAST_LEFT, CHEAP = 1e-3, SIZES.searched_again
 SAME_TIME = 1e-4  # less is the gap of the solvers [-]
 # Steps that a motion has on a leg at least (joint/guess.py).
 LEAST_STEPS = 2
+SEARCHED_ONLY = "a start or an end in motion is for path and feed searched together: leave geometry, corner, solver and filters out"
 KINEMATIC_MOST = SIZES.rivals_planned  # blocks; of more `kinematic` is planned only where nothing passes
 
 
@@ -61,10 +64,11 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
     """The joint search from a motion on splines."""
     from planner.planning.joint_search import joint_plan
 
-    first, steps = first_motion(job, settings), _least_steps(job)
+    led = with_leads(job)
+    first, steps = first_motion(led, settings), _least_steps(job)
     if first is None:
         return Tried(steps=steps)
-    if steps > CHEAP and first.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
+    if led is job and steps > CHEAP and first.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
         job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
         return Tried(steps=steps, left=False)
     kept = cache(partial(kept_on_path, settings=settings))
@@ -72,6 +76,28 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
     joint = found.plan is not None
     began = first.solution.cycle_time
     return Tried(best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower, began=began)
+
+
+def _in_motion(job: Job, settings: Settings, tried: Tried) -> Tried:
+    """The joint search of a path that begins or ends in motion; without a motion what can be said of it."""
+    from planner.planning.joint_leads import between_leads, why_not
+
+    asked, led = is_searched(job, settings), with_leads(job)
+    tried = _joint(job, settings, tried) if asked else tried
+    if tried.best is not None or tried.slower is not None:
+        return dataclasses.replace(tried, best=tried.best or tried.slower)
+    first = first_motion(led, settings) if asked else None
+    why = SEARCHED_ONLY if first is None else why_not(between_leads(first.motion(), job, led), job)
+    none = job.plan(
+        None,
+        method=settings.method,
+        corner=None,
+        solver="",
+        status=Status.INFEASIBLE,
+        sentence=why,
+        grid_points=0,
+    )
+    return dataclasses.replace(tried, best=none)
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:
@@ -142,8 +168,14 @@ ATTEMPTS = (
     Attempt("motion on the path", _not_joint, _on_path),
     Attempt("closed form", _closed_form_may_be_faster, _closed_form),
 )
+IN_MOTION = (Attempt("joint search", lambda job, settings, tried: True, _in_motion),)
 # Of a run on which the joint search does not end: the first, and the second one.
 ALONE, ON_PATH = ATTEMPTS[1:], ATTEMPTS[2:]
+
+
+def attempts_at(job: Job) -> tuple[Attempt, ...]:
+    """The attempts for a job: one alone makes motions that do not begin or do not end at rest."""
+    return IN_MOTION if any(job.toolpath.speeds) else ATTEMPTS
 
 
 class Retry(NamedTuple):

@@ -37,6 +37,7 @@ from planner.planning.job.job import Job
 from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.plan import Plan
 from planner.planning.job.runs_alone import ALONE_MOST, Alone, with_runs_alone
+from planner.planning.joint_leads import between_leads, with_leads
 from planner.planning.joint_start import Start
 from planner.planning.optimal.effort import Search, Settings
 from planner.planning.optimal.notes import path_notes
@@ -107,9 +108,9 @@ def joint_plan(
     others : what there is where the search does not end, or the verdict finds something
     motion : that on the path with its limits kept: it stays where the search does not end; else None
     """
-    stays = motion is not None
+    stays, led = motion is not None, with_leads(job)
     with job.stage("search") as report:
-        start = Start(motion or planned.motion(), job, search.cut)
+        start = Start(motion or between_leads(planned.motion(), job, led), job, search.cut)
         runs = list(tube_runs_of(job.toolpath, job.machine, jerk_limited=settings.order.jerk_limited))
         steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
         most = search.steps_max
@@ -127,9 +128,11 @@ def joint_plan(
                 job,
                 parts,
                 others.alone,
-                ALONE_MOST,
+                ALONE_MOST if led is job else 0,
                 settings.not_limited,
-                kept=lambda: None if (path := others.kept(job)) is None else RunsInTime(path[1], job),
+                kept=lambda: (
+                    None if led is not job or (path := others.kept(job)) is None else RunsInTime(path[1], job)
+                ),
             )
             if other is not None and (made is None or _time(other) < _time(made)):
                 made, found = other, looked
@@ -158,6 +161,7 @@ def joint_plan(
     if tables.prices is None and stays and priced(planned, job.machine):
         tables = dataclasses.replace(tables, priced=planned)
         notes = (OF_THE_START,)
+    of_path = path_notes(led.toolpath, planned, _stays(led, found, made.plans))
     plan = job.plan(
         delivered._replace(filtered=filters_count(*job.real)),
         method=settings.method,
@@ -167,7 +171,7 @@ def joint_plan(
         sentence=sentence,
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
         tables=tables,
-        notes=(*made.notes, *path_notes(job.toolpath, planned, _stays(job, found, made.plans)), *notes),
+        notes=(*made.notes, *(of_path if led is job else ()), *notes),
     )
     return Joint(plan, steps) if slower is None else Joint(None, steps, slower=plan)
 

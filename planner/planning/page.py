@@ -52,11 +52,13 @@ class Method(ABC):
     ways    : for machines with filters: pairs (share of the tolerance, of filters' lengths in closed forms,
               `Job.with_share`), tried beside (1, 1); the fastest plan is taken
     measures_filters : whether filters slow it down only where it is measured to leave the tolerance
+    in_motion        : whether its motions can begin and end in motion
     keeps_tangential : whether its motions keep the machine's limits of the tangential acceleration and jerk
     """
 
     ways: ClassVar[tuple[tuple[float, float], ...]] = ()
     measures_filters: ClassVar[bool] = False
+    in_motion: ClassVar[bool] = False
     keeps_tangential: ClassVar[bool] = True
 
     @property
@@ -91,6 +93,11 @@ class Method(ABC):
         An unsolved problem is the status of the plan.
         """
         job = job_of(program, machine, tolerance, Stages(progress, log))
+        shaped = getattr(self, "shaped", False)
+        if any(job.toolpath.speeds) and (not self.in_motion or shaped or machine.fir is not None):
+            raise InputError(
+                "a start or end speed is for methods optimal and second-order, on machines without filters [fir] and without shaped"
+            )
         limits = Limits.of(machine, job.toolpath.axes)
         for limit, value in ((TANGENTIAL, limits.tangential), (TANGENTIAL_JERK, limits.tangential_jerk)):
             if np.isfinite(value) and not self.keeps_tangential:
@@ -114,7 +121,7 @@ class Method(ABC):
             job.tell(
                 "share of tolerance", found=found, before=last, kept=best is made, share=share, filters=seen
             )
-        if (why := not_in_step(best, shaped=getattr(self, "shaped", False))) is not None:
+        if (why := not_in_step(best, shaped=shaped)) is not None:
             return best.without_motion(why)
         return _finished(best, job)
 

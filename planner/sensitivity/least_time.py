@@ -59,7 +59,7 @@ def least_time(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...
 
     not_limited : of velocity, acceleration and jerk, what the motions need not keep
     """
-    if machine.fir is not None or not set(toolpath.axes) <= set(LINEAR):
+    if machine.fir is not None or not set(toolpath.axes) <= set(LINEAR) or any(toolpath.speeds):
         return None
     way = way_of(toolpath, machine, not_limited)
     direction, by_axis = way.coordinates()

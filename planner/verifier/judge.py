@@ -82,7 +82,7 @@ def verify(
     of_samples = coarse + reader.delivered.period_faults()
     of_samples += reader.comparison.faults(limits, readings) if reader.comparison is not None else []
     of_samples += findings.column_faults(readings, limits, toolpath, pieces)
-    of_samples += samples.rest_faults(reader.delivered, readings, limits)
+    of_samples += samples.rest_faults(reader.delivered, readings, limits, toolpath.velocities)
     threads = thread_checks(trajectory, readings, toolpath, pieces, machine)
     extruder = extruder_seen(trajectory, readings, toolpath, pieces, given, not_limited)
     checks |= extruder.checks

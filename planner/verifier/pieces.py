@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES
 from planner.verifier.bends import apart_on_bend, arc_points, curve_counts, curve_points, reach_bend
 from planner.verifier.kernel import kernel
@@ -102,7 +102,7 @@ def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPi
     joint["budget"][:-1] = piece["budget"]
     joint["budget"][at] = toolpath.tolerance
     joint["real"][at] = True
-    joint["stop"][at] = toolpath.joint == Joint.STOP
+    joint["stop"][at] = toolpath.rests
     return ProgramPieces(vertex=vertex, joint=joint, piece=piece, frame=frame, turn=turn)
 
 

@@ -19,8 +19,9 @@ would pass: the quantity cannot be judged by the positions.
 
 Rest. A motion that rests at its first and last sample has run, over the period h next to it, per axis at most
 a h^2 / 2, and j h^3 / 6 where jerk is limited; its velocity is zero there, and with limited jerk its
-acceleration too. A file whose last samples are missing shows that here, although its end may be as near to
-the program's as the tolerance asks.
+acceleration too. Where a program asks for a speed at an end, the same holds of what the motion runs beside that.
+A file whose last samples are missing shows that here, although its end may be as near to the program's as the
+tolerance asks.
 
 Seconds. No program takes 200 times as long as at its feed, but for times in milliseconds or less.
 """
@@ -47,6 +48,8 @@ TOO_SLOW, TOO_SPARSE = 200.0, 10.0
 TIME_UNITS = ((1e5, 1e6, "microseconds"), (TOO_SLOW, 1e3, "milliseconds"))
 # Periods of a jittering clock are up to so many times the longest right one [-]; a missing sample makes 2.
 JITTER = 1.5
+# A speed asked for at an end is had to so much of itself [-], a thousandth of a millimetre per second at 100 mm/s.
+SPEED_ROUNDING = 1e-5
 # The rounding of differences is mentioned if it is more than this share of a limit [-].
 WORTH_A_WORD = 1e-3
 
@@ -175,8 +178,10 @@ def digits(
     return faults, [f"{said}: their differences know {', '.join(shares)}"]
 
 
-def rest_faults(delivered: Delivered, readings: list[Observed], limits: Limits) -> list[Fault]:
-    """A first or last sample that is not at rest."""
+def rest_faults(
+    delivered: Delivered, readings: list[Observed], limits: Limits, velocities: FloatArray
+) -> list[Fault]:
+    """A first or last sample that is not at rest, or not at the `velocities` (2, A) that the program asks for there [mm/s]."""
     t, x, given, axes = delivered.ends["t"], delivered.ends["position"], delivered.given, limits.axes
     if len(t) < 2:
         return []
@@ -184,26 +189,31 @@ def rest_faults(delivered: Delivered, readings: list[Observed], limits: Limits) 
     jerk = limits.per_axis[2] * np.maximum(1.0, measured(readings, JERK))
     said = []
     for name, at, beside, advice in (("start", 0, 1, ""), ("end", -1, -2, ": are the last samples missing?")):
+        asked = velocities[at]
+        wrong = "not at the speed asked for" if asked.any() else "not at rest"
         h = abs(float(t[at] - t[beside])) + given.end_rounding + 2.0 * given.time_rounding
         furthest = acceleration * h * h / 2.0
         if limits.jerk_limited:
             furthest = np.minimum(furthest, jerk * h**3 / 6.0)
         rounding = ROUNDING_ULPS * 2.0**-52 * (np.abs(x[at]) + delivered.run + limits.per_axis[0] * t[at])
-        over = (
-            np.abs(x[at] - x[beside]) - furthest * (1.0 + RATIO_ROUNDING) - 2.0 * (rounding + limits.rounding)
-        )
+        rounding += np.abs(asked) * (given.end_rounding + given.time_rounding + SPEED_ROUNDING * h)
+        moved = np.abs(x[at] - x[beside] - asked * (t[at] - t[beside]))
+        over = moved - furthest * (1.0 + RATIO_ROUNDING) - 2.0 * (rounding + limits.rounding)
         k = int(over.argmax())
         if over[k] > 0:
             found = (
-                f"not at rest: {axes[k]} moves by {abs(x[at, k] - x[beside, k]):.4g} mm in the period of {h:.4g} s "
+                f"{wrong}: {axes[k]} moves by {moved[k]:.4g} mm {'more or less ' if asked.any() else ''}in the period of {h:.4g} s "
                 f"next to it, {furthest[k]:.4g} mm are possible{advice}"
             )
             said.append(Fault(Kind.SAMPLES, name, found, time=float(t[at])))
         for quantity, row in (("velocity", 0), ("acceleration", 1)):
-            value: FloatArray = np.abs(delivered.ends[quantity][at])
-            k = int((value / limits.per_axis[row]).argmax())
+            value: FloatArray = np.abs(delivered.ends[quantity][at] - (asked if row == 0 else 0.0))
+            allowed = RATIO_ROUNDING * limits.per_axis[row] + (
+                SPEED_ROUNDING * np.abs(asked) if row == 0 else 0.0
+            )
+            k = int((value / allowed).argmax())
             judged = quantity in given.columns and (row == 0 or limits.jerk_limited)
-            if judged and value[k] > RATIO_ROUNDING * limits.per_axis[row, k]:
-                found = f"not at rest: {quantity}.{axes[k]} is {value[k]:.4g} at t = {t[at]:.6g} s{advice}"
+            if judged and value[k] > allowed[k]:
+                found = f"{wrong}: {quantity}.{axes[k]} is {delivered.ends[quantity][at, k]:.4g} at t = {t[at]:.6g} s{advice}"
                 said.append(Fault(Kind.SAMPLES, name, found, time=float(t[at])))
     return said

@@ -10,7 +10,7 @@ import pytest
 import planner
 from planner.base.errors import InputError
 from planner.controls.machine_import.linuxcnc import settings
-from planner.machine import builtin_text, load_machine
+from planner.machine import Machine, builtin_text, load_machine
 
 TEMPLATE = Path(planner.__file__).parent / "templates" / "machine.toml"
 
@@ -209,3 +209,24 @@ def test_built_in_printers_have_an_extruder(name: str) -> None:
     program = planner.read_program(text=text, machine=name)
     assert program.extruded.tolist() == [0.0, 2.0, -3.0, 0.0]
     assert not [said for said in program.assumptions if "E word" in said]
+
+
+def test_a_machine_in_one_line_has_the_limits_of_its_axes() -> None:
+    machine = Machine.of("xyc", [500.0, 400.0, 90.0], 4000.0, 100_000.0, tolerance=0.05)
+    assert [machine.axes[letter].velocity for letter in "xyc"] == [500.0, 400.0, 90.0]
+    assert {axis.acceleration for axis in machine.axes.values()} == {4000.0}
+    assert (machine.tolerance, machine.dt, machine.name) == (0.05, 0.001, "machine")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("xy", [1.0, 2.0, 3.0], 1.0, 1.0), "velocity: 3 limits for the axes 'xy'"),
+        (("xx", 1.0, 1.0, 1.0), "give each letter once"),
+        (("xy", -1.0, 1.0, 1.0), "velocity: must be above 0"),
+        (("x", 1.0, 1.0, 1.0), "axis 'y' is missing"),
+    ],
+)
+def test_a_machine_in_one_line_says_what_is_wrong(given: tuple, said: str) -> None:  # type: ignore[type-arg]
+    with pytest.raises(InputError, match=said):
+        Machine.of(*given)

@@ -19,7 +19,8 @@ the step of the velocity takes no more than a tenth (K) of what an axis may do i
 at nine tenths of the acceleration beside it. An arc of the program is passed at v^2 <= N a R, a being what every axis of its
 plane allows, with (1 - (v_m^2 / a R)^2)^(1/2) of the acceleration along it, v_m its speed without a feed; a kink
 beside one takes twice as much. A rest of a line that is passed in less than four periods
-belongs to the arc after it. The last move ends with half of the acceleration. Moves are seen `BLOCKS` ahead,
+belongs to the arc after it; any other one takes a period at least. A spline is cut into pairs of arcs, four for each of its
+control points. The last move ends with half of the acceleration. Moves are seen `BLOCKS` ahead,
 at the end of which the motion must be able to stand. Q joins moves before all that: points within Q of the
 straight line from the first point to the last are left out.
 
@@ -84,6 +85,7 @@ class Bends:
     radius: FloatArray  # (n,) [mm]; inf of lines
     radial: FloatArray  # (n, A) unit vector from the centre to where an arc begins; 0 of lines
     across: FloatArray  # (n, A) and in its plane at a right angle to that
+    parts: FloatArray  # (n,) into how many arcs it is cut, each of which takes a period at least
 
     def of(self, moves: Array | slice) -> "Bends":
         """Some of the moves, by their numbers (k,), a mask (n,) or a slice."""
@@ -97,7 +99,9 @@ def lines(points: FloatArray) -> Bends:
     way = step / np.maximum(length, 1e-300)[:, None]
     flat = np.full(len(length), np.inf)
     none = np.zeros_like(way)
-    return Bends(first=way, last=way, length=length, radius=flat, radial=none, across=none)
+    return Bends(
+        first=way, last=way, length=length, radius=flat, radial=none, across=none, parts=np.ones(len(length))
+    )
 
 
 def linuxcnc_times(
@@ -143,7 +147,7 @@ def _times(bends: Bends, feed: FloatArray, stop: Array, tolerance: FloatArray, l
     """`linuxcnc_times` of moves that all have a length, with stops and tolerances (n-1,) between them."""
     length = bends.length
     most, straight = _along(bends, limits)
-    top = np.minimum(np.minimum(feed, most), np.minimum(length / limits.dt, limits.feed_max))
+    top = np.minimum(np.minimum(feed, most), np.minimum(length / (bends.parts * limits.dt), limits.feed_max))
     # nothing is rounded at stops, and between rapids and feed moves
     exact = stop | (np.isinf(feed[1:]) != np.isinf(feed[:-1]))
     outside = _not_in_one_plane(bends)
@@ -157,6 +161,7 @@ def _times(bends: Bends, feed: FloatArray, stop: Array, tolerance: FloatArray, l
     straight *= np.where(np.append(False, kinks) | np.append(kinks, False), 1.0 - KINK, 1.0)
     swallowed = np.append(arc > 0, False) & (rest < GAP_CYCLES * limits.dt * np.append(speed, 0.0))
     swallowed &= np.isinf(bends.radius)
+    top = np.where(swallowed | (rest <= 0.0), top, np.minimum(top, rest / limits.dt))
     straight = np.where(swallowed, np.minimum(straight, np.append(np.inf, left)), straight)
     straight *= np.where(np.append(ramps | stop, True) | np.append(False, ramps), LAST, 1.0)
     pieces, tops, accels = (_alternate(*pair) for pair in ((rest, arc), (top, speed), (straight, left)))

@@ -35,6 +35,8 @@ TIMED = (LINUXCNC, *CONTROLS)  # names of the controls that there are models of
 SWITCHES = (3, 4, 5, 7, 8, 9)  # M codes of spindle and coolant, at which the motion stands
 CHANGE = 6  # M code of a tool change
 FIRST_FEED = 25.0  # of rapids before the first F word, as Klipper begins [mm/s]
+# Of a control point of a spline LinuxCNC makes four pairs; third differences below this are rounding [mm].
+ARCS_OF_POINT, QUADRATIC = 8.0, 1e-9
 _COMMENT = re.compile(rb"^[ \t]*(?:N\d+[ \t]*)?(?:\(([^)\n]*)\)|;([^\n]*?))[ \t]*\r?$", re.MULTILINE)
 _LAYER = re.compile(r"(?:LAYER|layer):?[ _]*(-?\d+)|LAYER_CHANGE|CHANGE_LAYER")
 _F_WORD = re.compile(rb"^[^(;\n]*?[Ff][ \t]*(\d*\.?\d+)", re.MULTILINE)
@@ -162,7 +164,7 @@ def _on_linuxcnc(
     alone = toolpath.rapid | ~toolpath.straight | (mode != PathControl.BLEND)
     kept = linuxcnc.joined_moves(points, feed, alone, stands, q)
     last = kept[1:] - 1  # move that each kept one ends with
-    bends = _with_arcs(linuxcnc.lines(points[kept]), toolpath, last)
+    bends = _with_arcs(linuxcnc.lines(points[kept]), program, toolpath, last)
     found = linuxcnc.linuxcnc_times(
         points[kept], feed[last], stands[kept], machine, toolpath.axes, p[last[:-1]], bends
     )
@@ -173,7 +175,7 @@ def _on_linuxcnc(
     return times, len(kept) - 1, (said,) if without else ()
 
 
-def _with_arcs(lines: linuxcnc.Bends, toolpath: Toolpath, segment: Array) -> linuxcnc.Bends:
+def _with_arcs(lines: linuxcnc.Bends, program: Program, toolpath: Toolpath, segment: Array) -> linuxcnc.Bends:
     """Moves (n,) with what they are where the segments of the same number are arcs or curves."""
     found = {name: column.copy() for name, column in vars(lines).items()}
     on = np.flatnonzero(~toolpath.straight[segment])
@@ -182,8 +184,28 @@ def _with_arcs(lines: linuxcnc.Bends, toolpath: Toolpath, segment: Array) -> lin
     found["length"][on], found["radius"][on] = toolpath.length[of], 1.0 / toolpath.curvature[of]
     arcs = np.flatnonzero(arc >= 0)
     found["radius"][arcs] = toolpath.arcs.radius[arc[arcs]]
+    found["parts"][on] = _arcs_of_curves(program, toolpath)[of]
     found["radial"][arcs], found["across"][arcs] = toolpath.arcs.e1[arc[arcs]], toolpath.arcs.e2[arc[arcs]]
     return linuxcnc.Bends(**found)
+
+
+def _arcs_of_curves(program: Program, toolpath: Toolpath) -> FloatArray:
+    """(M,) into how many arcs LinuxCNC cuts segments: 1, and of a spline its share of `ARCS_OF_POINT` times its control
+    points, as many as pieces and the degree."""
+    splines, blocks = program.splines, len(program)
+    third = splines.points[:, 3] - splines.points[:, 0] - 3.0 * (splines.points[:, 2] - splines.points[:, 1])
+    points = np.bincount(splines.block, minlength=blocks).astype(np.float64)
+    np.maximum.at(
+        degree := np.full(blocks, 2.0),
+        splines.block,
+        np.where((abs(third) > QUADRATIC).any(axis=1), 3.0, 2.0),
+    )
+    share = (
+        toolpath.length
+        / np.bincount(toolpath.block, weights=toolpath.length, minlength=blocks)[toolpath.block]
+    )
+    arcs: FloatArray = ARCS_OF_POINT * (points + degree)[toolpath.block] * share
+    return np.where(toolpath.curve >= 0, arcs, 1.0)
 
 
 def _joining(program: Program, toolpath: Toolpath, text: bytes) -> float:

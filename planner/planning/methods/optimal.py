@@ -10,7 +10,7 @@ from planner.base.names import AUTO, NORMAL, effort_name
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
-from planner.planning.attempts import ATTEMPTS, is_searched
+from planner.planning.attempts import attempts_at, is_searched
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.effort import EFFORTS, Settings
@@ -43,7 +43,7 @@ class OptimalMethod(Method):
     smooth: float = 0.0
     shaped: bool = False
 
-    ways, measures_filters = ((0.5, 1.0), (0.1, 1.0)), True
+    ways, measures_filters, in_motion = ((0.5, 1.0), (0.1, 1.0)), True, True
 
     @property
     def keeps_power(self) -> bool:
@@ -64,7 +64,7 @@ class OptimalMethod(Method):
             effort=dataclasses.replace(effort, search=search),
             joint=self._joint,
         )
-        made = shaped_plan(job, settings) if self.shaped else best_of(ATTEMPTS, job, settings)
+        made = shaped_plan(job, settings) if self.shaped else best_of(attempts_at(job), job, settings)
         if self.smooth and (self.shaped or not is_searched(job, settings)):
             made = dataclasses.replace(made, notes=(*made.notes, NOT_SMOOTHER))
         return made

@@ -11,7 +11,7 @@ from planner.base.names import AUTO, NORMAL, effort_name
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.solvers import REACHABILITY, second_order_solver
-from planner.planning.attempts import ATTEMPTS
+from planner.planning.attempts import attempts_at
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.effort import EFFORTS, Settings
@@ -35,7 +35,7 @@ class SecondOrderMethod(Method):
     effort: str = NORMAL
     shaped: bool = False
 
-    ways, measures_filters = ((0.5, 1.0), (0.1, 1.0)), True
+    ways, measures_filters, in_motion = ((0.5, 1.0), (0.1, 1.0)), True, True
 
     def plan_job(self, job: Job) -> Plan:
         order = SecondOrder(second_order_solver(self.solver), to_tighten=self.shaped)
@@ -47,4 +47,4 @@ class SecondOrderMethod(Method):
             effort=effort,
             joint=self.corner == AUTO and self.solver == REACHABILITY,
         )
-        return shaped_plan(job, settings) if self.shaped else best_of(ATTEMPTS, job, settings)
+        return shaped_plan(job, settings) if self.shaped else best_of(attempts_at(job), job, settings)

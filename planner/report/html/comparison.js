@@ -44,9 +44,24 @@
         line: { width: 3, color: about.colours[k] }, customdata: keep("line"), hovertemplate: `${rows[k].method}, line %{customdata}<extra></extra>` }, k);
     });
   }
+  // On paper, where WebGL leaves nothing: the paths along their thinnest direction.
+  function flat(traces, size = 900) {
+    const ends = ["x", "y", "z"].map((axis) => {
+      let low = Infinity, high = -Infinity;
+      for (const trace of traces) for (const value of trace[axis]) [low, high] = [Math.min(low, value), Math.max(high, value)];
+      return { axis, low, high, wide: high - low };
+    });
+    const thin = ends.reduce((a, b) => (b.wide <= a.wide ? b : a)), [u, v] = ends.filter((one) => one !== thin);
+    const scale = size / Math.max(u.wide, v.wide, 1e-9), at = (value) => (value * scale + 4).toFixed(1);
+    const lines = traces.filter((trace) => trace.visible).map((trace) =>
+      `<polyline stroke="${trace.line.color}" points="${Array.from(trace[u.axis], (x, k) => `${at(x - u.low)},${at(v.high - trace[v.axis][k])}`).join(" ")}"/>`);
+    return `<svg viewBox="0 0 ${at(u.wide + 4 / scale)} ${at(v.wide + 4 / scale)}" fill="none" stroke-width="1.2">${lines.join("")}</svg>`;
+  }
   const space = shown.length ? pathLayout(about.view, element("path")) : null;
   async function draw() {
-    await Plotly.react("path", paths(), space, bare);
+    const traces = paths();
+    element("first").innerHTML = flat(traces);
+    await Plotly.react("path", traces, space, bare);
     const [data, layout] = panels(about.profile, against);
     await Plotly.react("profile", data.map((trace, n) => visible(trace, shown[n % shown.length])), { ...layout, showlegend: false, uirevision: against }, bare);
   }

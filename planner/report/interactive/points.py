@@ -33,6 +33,8 @@ def path(
     axes: str = "",
     tolerance: float | None = None,
     spline: bool = False,
+    start_speed: float = 0.0,
+    end_speed: float = 0.0,
 ) -> Program:
     """A program that goes straight from each point to the next, or on a spline through all of them.
 
@@ -45,10 +47,15 @@ def path(
     spline    : the cubic spline through the points with no curvature at its ends, over the lengths of the moves (in mm and
                 degrees): tangents and curvature go on at each point
 
-    `Program.line` counts the moves from 1. Motions begin and end at rest.
+    start_speed, end_speed : [mm/s] along the path at its first and last point, counted as the feed is, with no
+                acceleration: 0 for rest
+
+    `Program.line` counts the moves from 1. A start or end in motion is for methods `optimal` and `second-order`. One above
+    the feed or the limits of the axes is refused; where a path cannot be left or reached so fast `Plan.solved` is False.
 
     Raises InputError for arrays of another shape, values that are not finite, letters that are no axes or come twice,
-    feeds that are not above 0, a tolerance below 1e-5, and splines without a feed or with a point twice running.
+    feeds that are not above 0, a tolerance below 1e-5, and splines without a feed or with a point twice running, and
+    speeds below 0 or without a feed.
 
     >>> import planner
     >>> square = planner.path([[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]], feed=50.0)
@@ -73,7 +80,20 @@ def path(
     program = program_of_points(
         position, np.where(turning, speed * RAD_PER_DEG, speed), tolerance, axes=named
     )
+    speeds = _speeds(start_speed, end_speed, given=feed is not None)
+    speeds *= np.where(turning[[0, -1]], RAD_PER_DEG, 1.0)
+    program = dataclasses.replace(program, speeds=tuple(speeds.tolist()))
     return program if not spline else _on_spline(program, given, unit, columns)
+
+
+def _speeds(start: float, end: float, *, given: bool) -> FloatArray:
+    """(2,) the speeds at both ends. Raises InputError unless they are finite and 0 or more; above it where a feed is given."""
+    speeds = _numbers([start, end], "start_speed and end_speed: give a number, in mm/s")
+    if speeds.shape != (2,) or not (np.isfinite(speeds) & (speeds >= 0.0)).all():
+        raise InputError(f"start_speed {start}, end_speed {end}; they must be 0 mm/s or more, and finite")
+    if speeds.any() and not given:
+        raise InputError("start_speed and end_speed need a feed, and there is none")
+    return speeds
 
 
 def _on_spline(program: Program, points: FloatArray, unit: FloatArray, columns: list[int]) -> Program:
@@ -118,6 +138,10 @@ def stretched(plan: Plan, duration: float) -> Plan:
         raise InputError("threads, an extruder and the tool centre point are not run slower")
     if duration == was.cycle_time:
         return plan
+    if any(plan.toolpath.speeds):
+        raise InputError(
+            "a motion that begins or ends in motion is not run slower: the speeds there are those asked for"
+        )
     factor, dt = duration / was.cycle_time, plan.machine.dt
     t = np.append(np.arange(np.ceil(duration / dt - _LAST)) * dt, duration)
     theta = np.minimum(t / factor, was.t[-1])

@@ -13,6 +13,7 @@ import pytest
 import planner
 from planner.controls.export.program import write_program
 from planner.controls.timing.linuxcnc import BLOCKS, LAST, NORMAL, joined_moves, linuxcnc_times
+from planner.controls.timing.times import control_times
 from planner.machine import Machine
 from planner.nc.program import Kind
 
@@ -205,3 +206,35 @@ def test_programs_of_another_dialect_are_written_as_moves(tmp_path: Path) -> Non
     again = planner.read_program(text=(tmp_path / made.file).read_text())
     assert again.end[-1] == pytest.approx([40, 40, 0])
     assert "is no linuxcnc program" in made.notes[0]
+
+
+# Times of LinuxCNC 2.9 in real time (linuxcnc_run.py) of programs with splines, and of its planner stepped (lcnc_fast.py) [s].
+RUN = {"systems": 32.321, "circle_small_segments_ncd": 15.221}
+ZIGZAG_OF_SPLINES = 4.854
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_short_splines_and_the_rests_of_short_lines_take_a_period_at_least(name: str) -> None:
+    """Each spline of `systems` becomes 24 arcs; of `circle...` every fourth corner is none, beside which half a line is left."""
+    file = SHARED / "nc" / f"LinuxCNC__linuxcnc__{name}.ngc"
+    if not file.exists():
+        pytest.skip("real programs of ../shared are not here")
+    found = planner_time(planner.read_program(file, MACHINE))
+    assert found == pytest.approx(RUN[name], rel=0.02)
+
+
+def test_cubic_splines_are_cut_into_more_arcs_than_quadratic_ones() -> None:
+    cubic = "\n".join(
+        f"G5 X{k + 1} Y{0.3 * ((k + 1) % 2):.3f} I0.4 J{0.1 if k % 2 == 0 else -0.1} P-0.3 Q0.05"
+        for k in range(100)
+    )
+    program = planner.read_program(text=f"G21 F6000\nG1 X0 Y0\n{cubic}\nG1 X110\n", machine=MACHINE)
+    assert planner_time(program) == pytest.approx(ZIGZAG_OF_SPLINES, rel=0.02)
+    short = "\n".join(f"G5.1 X{k / 1000:.3f} I0.0005 J0" for k in range(1, 101))
+    quadratic = planner.read_program(text=f"G21 F6000\nG1 X0 Y1\nG1 X0 Y0\n{short}\n", machine=MACHINE)
+    assert planner_time(quadratic) >= 100 * 24 * MACHINE.dt
+
+
+def planner_time(program: planner.Program) -> float:
+    found = control_times(program, MACHINE, "linuxcnc", 0.05)
+    return found.seconds - found.dwells

@@ -68,6 +68,11 @@ def test_a_browser_shows_and_hides_the_methods(file: Path) -> None:
     assert browser.execute_script("return comparison.state().shown") == 3
     browser.find_elements(By.CSS_SELECTOR, "tr.choice")[1].click()
     assert browser.execute_script("return comparison.state().hidden") == [1]
+    on_paper = "return document.querySelectorAll('#first polyline').length"  # WebGL leaves it empty
+    assert browser.execute_script(on_paper) == 2
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    assert browser.execute_script("return document.getElementById('first').clientHeight") > 100
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "screen"})
     browser.find_element(By.CSS_SELECTOR, "[data-against=line]").click()
     assert (
         browser.execute_script("return document.getElementById('profile').layout.xaxis.title.text")

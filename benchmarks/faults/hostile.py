@@ -1,4 +1,4 @@
-"""Kinds of faults at the kernels that are kept, and files that are made to do harm (benchmarks/faults/kinds.py has the others)."""
+"""Kinds of faults at the kernels that are kept (benchmarks/faults/kinds.py has the others)."""
 
 from __future__ import annotations
 
@@ -6,16 +6,11 @@ import hashlib
 import os
 import pickle
 import random
-import resource
 import shutil
 import signal
 import time
-import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from benchmarks.faults.bench import Bench, after, ended
 
@@ -23,7 +18,6 @@ STOP = ("plan", "a.ngc", "-o", "out", "-q", "--method", "stop")
 COMPILING = 12.0  # in which it is ended: about as long as compiling what `STOP` needs takes [s]
 DIGEST = hashlib.sha256().digest_size
 STRANGER = 54321  # a user that is not there
-ADDRESSES = 6 << 30  # of memory for a bomb [bytes]
 # A command, and then the kernels that it has used.
 USED = """
 from planner.base.kernel_files import used
@@ -31,8 +25,6 @@ from planner.cli import app
 app(standalone_mode=False)
 print(*used(), sep=chr(10))
 """
-SECONDS = 40  # of processor time for a bomb [s]
-GIBIBYTE = 1 << 30
 
 
 # ------------------------------------------------------------------------------------------ kernels
@@ -180,96 +172,3 @@ def planted(bench: Bench, rng: random.Random) -> dict[str, Any]:
     if mark.exists():
         mark.rmdir()
     return row | {"wrong": row["wrong"] + ran}
-
-
-# ------------------------------------------------------------------------------------------ bombs
-
-
-def _zipped(place: Path) -> Path:
-    """A trajectory of 2 GiB of zeros in some megabytes, whose columns differ in length."""
-    file = place / "bomb.npz"
-    header = np.lib.format.header_data_from_array_1_0(np.zeros(1)) | {"shape": (GIBIBYTE // 4,)}
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        with archive.open("t.npy", "w", force_zip64=True) as opened:
-            np.lib.format.write_array_header_1_0(opened, header)  # type: ignore[arg-type]
-            for _ in range(2 * 64):
-                opened.write(bytes(GIBIBYTE // 64))
-        with archive.open("x.npy", "w") as opened:
-            np.lib.format.write_array(opened, np.zeros(16))  # type: ignore[arg-type]
-    return file
-
-
-def _columns(place: Path) -> Path:
-    """A trajectory of 2e8 rows in a few kilobytes."""
-    import pyarrow
-    import pyarrow.parquet
-
-    file = place / "bomb.parquet"
-    rows = 10_000_000
-    table = pyarrow.table({name: np.zeros(rows) for name in ("t", "x")})
-    with pyarrow.parquet.ParquetWriter(file, table.schema, compression="zstd") as writer:
-        for _ in range(20):
-            writer.write_table(table, row_group_size=rows)
-    return file
-
-
-def _settings(place: Path, text: str) -> Path:
-    file = place / "bomb.toml"
-    file.write_text(text)
-    return file
-
-
-def _program(place: Path, text: str) -> Path:
-    file = place / "bomb.ngc"
-    file.write_text(text)
-    return file
-
-
-def _judged(file: Path) -> list[str]:
-    return ["verify", file.name, "a.ngc", "-q"]
-
-
-def _on_machine(file: Path) -> list[str]:
-    return ["plan", "a.ngc", "-m", file.name, "-q"]
-
-
-def _read(file: Path) -> list[str]:
-    return ["plan", file.name, "-q", "--method", "stop"]
-
-
-LINE = 10_000_000  # characters
-DEEP = 100_000  # brackets, tables, digits
-BOMBS: dict[str, Callable[[Path], list[str]]] = {
-    "npz": lambda place: _judged(_zipped(place)),
-    "parquet": lambda place: _judged(_columns(place)),
-    "toml, deep": lambda place: _on_machine(_settings(place, "[" + ".".join("a" * DEEP) + "]\n")),
-    "toml, wide": lambda place: _on_machine(_settings(place, "".join(f"[t{n}]\n" for n in range(DEEP)))),
-    "toml, nested": lambda place: _on_machine(_settings(place, "a = " + "[" * DEEP + "]" * DEEP)),
-    "toml, digits": lambda place: _on_machine(_settings(place, "dt = " + "9" * DEEP)),
-    "toml, large": lambda place: _on_machine(_settings(place, "# " + "a" * LINE)),
-    "line": lambda place: _read(_program(place, "G21 G90 F600\nG1 X" + "1" * LINE + "\n")),
-    "comment": lambda place: _read(_program(place, "G21 G90 F600\n(" + "a" * LINE + ")\nG1 X1\nM2\n")),
-    "words": lambda place: _read(_program(place, "G21 G90 F600\nG1" + " X1" * (LINE // 3) + "\nM2\n")),
-    "brackets": lambda place: _read(_program(place, "G21 G90 F600\nG1 X" + "[" * DEEP + "1" + "]" * DEEP + "\n")),
-    "loop": lambda place: _read(_program(place, "F600\no1 while [1]\nG1 X1\nX0\no1 endwhile\nM2\n")),
-    "calls": lambda place: _read(_program(place, "o1 sub\no1 call\no1 call\no1 endsub\nF600\no1 call\nM2\n")),
-}  # fmt: skip
-
-
-def bomb(bench: Bench, rng: random.Random) -> dict[str, Any]:
-    """A small file that asks for much: a sentence within some seconds and gigabytes. All kinds in turn."""
-    bench.turn = (bench.turn + 1) % len(BOMBS)
-    kind = list(BOMBS)[bench.turn]
-    words = BOMBS[kind](bench.folder)
-
-    def lower() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-
-    used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    end = bench.run(*words, preexec_fn=lower)
-    used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used
-    for path in bench.folder.glob("bomb.*"):
-        path.unlink()
-    allowed = (0,) if kind == "comment" else (2, 3)
-    return bench.row([end], allowed, bomb=kind, cpu=round(used, 1), words=len(end[1].split()))

@@ -15,7 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from benchmarks.faults import hostile
+from benchmarks.faults import bombs, hostile
 from benchmarks.faults.bench import ENDS, HIDDEN, INTERRUPTED, JOBS, PATIENCE, Bench, after, ended, not_whole
 
 
@@ -293,5 +293,5 @@ KINDS: dict[str, Callable[[Bench, random.Random], dict[str, Any]]] = {
     "first-runs": hostile.first_runs,
     "damaged-kernels": hostile.damaged,
     "planted-kernels": hostile.planted,
-    "bomb": hostile.bomb,
+    "bomb": bombs.bomb,
 }

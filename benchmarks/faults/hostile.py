@@ -8,11 +8,13 @@ import pickle
 import random
 import shutil
 import signal
+import subprocess
 import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.faults.bench import Bench, after, ended
+from benchmarks.faults.bench import Bench, after, ended, mounted
+from planner.base.kernel_files import PACKAGE
 
 STOP = ("plan", "a.ngc", "-o", "out", "-q", "--method", "stop")
 COMPILING = 12.0  # in which it is ended: about as long as compiling what `STOP` needs takes [s]
@@ -25,9 +27,7 @@ from planner.cli import app
 app(standalone_mode=False)
 print(*used(), sep=chr(10))
 """
-
-
-# ------------------------------------------------------------------------------------------ kernels
+NO_HOME = ("HOME", "XDG_", "MPL", "NUMBA_CACHE_DIR")  # variables that say where files may be kept
 
 
 def with_cache(cache: Path, **more: str) -> dict[str, str]:
@@ -172,3 +172,57 @@ def planted(bench: Bench, rng: random.Random) -> dict[str, Any]:
     if mark.exists():
         mark.rmdir()
     return row | {"wrong": row["wrong"] + ran}
+
+
+def no_room(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """Kernels are missing, and the disk where they are to be kept is full: they are compiled, one warning says it, and no part is
+    left there."""
+    place = bench.folder / "full"
+    with mounted(place, "size=16m") as there:
+        shutil.rmtree(place / "planner", ignore_errors=True)
+        shutil.copytree(warm(bench) / "planner", place / "planner")
+        missing = rng.sample(sorted(place.rglob("*.kernel")), 2)
+        for path in missing:
+            path.unlink()
+        if there:
+            _fill(place / "planner" / "filling", rng.choice([0, 1, 8]) << 10)
+        end = bench.run(*STOP, env=with_cache(place))
+        (place / "planner" / "filling").unlink(missing_ok=True)
+        wrong = unsound(place)
+        shutil.rmtree(place / "planner")
+    row = bench.row([end], (0,), mounted=there, missing=[path.name for path in missing])
+    if there and end[1].count("cannot be kept") != 1:
+        wrong.append(f"said: {end[1][-300:]}")
+    return row | {"wrong": row["wrong"] + wrong}
+
+
+def _fill(file: Path, room: int) -> None:
+    """All but so many bytes of a disk."""
+    with open(file, "wb", buffering=0) as opened:
+        try:
+            while True:
+                opened.write(bytes(4096))
+        except OSError:
+            opened.truncate(max(opened.tell() - room, 0))
+
+
+def read_only_package(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """A package that nobody can write, on a system without a home: it plans, also where a kernel is missing."""
+    place, kernels = bench.folder / "package", Path("planner/kernels")
+    with mounted(place, "size=64m") as there:
+        ignored = shutil.ignore_patterns("__pycache__", "kernels")
+        shutil.copytree(PACKAGE, place / "planner", ignore=ignored, dirs_exist_ok=True)
+        shutil.copytree(warm(bench) / "planner", place / kernels, dirs_exist_ok=True)
+        missing = rng.random() < 0.5
+        if missing:
+            rng.choice(sorted((place / kernels).iterdir())).unlink()
+        if there:
+            subprocess.run(["mount", "-o", "remount,ro", str(place)], check=True)
+        environment = {name: value for name, value in os.environ.items() if not name.startswith(NO_HOME)}
+        environment |= {"PYTHONPATH": str(place), "HOME": "/proc/self"}
+        end = bench.run(*STOP, env=environment)
+        if not there:
+            shutil.rmtree(place)
+    row = bench.row([end], (0,), mounted=there, missing=missing)
+    told = [] if ("cannot be kept" in end[1]) == (missing and there) else [f"said: {end[1][-300:]}"]
+    return row | {"wrong": row["wrong"] + told}

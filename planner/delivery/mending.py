@@ -63,7 +63,7 @@ def mended(
     edges = without_stands(np.stack(stands, axis=1), edges.ravel())[0].reshape(-1, 2)
     if again >= EVERYWHERE and slower.max() <= 1.0 + LITTLE:
         edges, by = np.array([[0.0, np.inf]]), np.array([TWICE * (slower.max() - 1.0) + MORE])
-    w, pad = _reach(verdict), PERIODS * dt
+    w, pad = reach_of(verdict), PERIODS * dt
     jerk_limited = any(name.startswith("jerk") and check.limited for name, check in verdict.limits.items())
     if isinstance(motion, ShapedMotion):  # what its copies are of
         edges[:, 0] -= motion.shaper.length
@@ -126,7 +126,7 @@ def _rests(
     return first(edges[low:k][::-1], 0.0), first(edges[n:high], np.inf)
 
 
-def _reach(verdict: Verdict) -> float:
+def reach_of(verdict: Verdict) -> float:
     """How far before and behind a place a motion has to be slower [s], by its verdict (motion/slowed.py)."""
     groups = {name.partition(".")[2] for name, check in verdict.limits.items() if check.limited} - {""}
 

@@ -240,4 +240,4 @@ def test_a_limit_along_the_path_reaches_as_far_as_what_all_axes_do_asks_for():
     t = made.trajectory
     v, a = np.linalg.norm(t.velocity, axis=1).max(), np.abs(np.diff(t.feed) / np.diff(t.t)).max()
     least = reach(v, a, 2e4)
-    assert least <= mending._reach(verdict) < 10.0 * least
+    assert least <= mending.reach_of(verdict) < 10.0 * least

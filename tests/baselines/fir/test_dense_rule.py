@@ -20,7 +20,7 @@ def dense(corner: np.ndarray, at: int) -> tuple[float, float, float]:
         s=np.append(0.0, np.cumsum(length)), point=corner, direction=step / length[:, None],
         budget=np.ones(len(corner)), inner=np.ones(len(corner), dtype=bool),
     )  # fmt: skip
-    return rules._at_speed_dense.py_func(at, (0, len(corner) - 1), SPEED, line, ACCELERATION, T1, T2)
+    return rules.at_speed_dense.py_func(at, (0, len(corner) - 1), SPEED, line, ACCELERATION, T1, T2)
 
 
 def uneven(count: int = 61) -> np.ndarray:

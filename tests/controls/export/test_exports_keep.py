@@ -248,8 +248,6 @@ def test_what_no_straight_move_can_say_is_refused_with_its_line() -> None:
     assert refused("G21 G90\nG0 Z1\nG2 I4 J0 F600\nM2\n", "klipper").startswith(
         "3: G2 (it cannot be written as straight moves"
     )
-    curve = "G21 G90\nG0 Z1\nG5.2 P1 X4 Y2 L3 F600\nP1 X6 Y3\nP1 X8 Y1\nG5.3\nM2\n"
-    assert refused(curve, "grbl").startswith("3: G5.2 (it cannot be written as straight moves")
     assert refused("G21 G90\nG93\nG0 X0 Y0\nG1 X4 F30\nM2\n", "marlin").startswith("2: G93")
     assert refused("G21 G90\nG0 X0 Y0\nM66 P1 L0\nG1 X4 F30\nM2\n", "grbl").startswith("3: M66")
     assert refused("G21 G90\nG0 X0 Y0\nM140 S60\nG1 X4 F30\nM2\n", "grbl").startswith("3: M140")

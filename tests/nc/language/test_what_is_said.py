@@ -133,3 +133,10 @@ def test_more_digits_than_there_are_numbers_for_are_refused_with_their_line(text
     """They are infinite, which Python has no literal for; an infinite number times nothing would be a word left out."""
     with pytest.raises(InputError, match=rf":{place}.*: a number is too large"):
         parse_program(text.format("1" * 400), MACHINE)
+
+
+@pytest.mark.parametrize("number", [0, -1, 5602, 6000])
+def test_a_computed_parameter_that_there_is_not_is_refused(number: int) -> None:
+    text = f"G21 G90 F600\n#1={number}\n#[#1]=2\nG1 X1\nM2\n"
+    with pytest.raises(InputError, match=rf":3:.*#{number} (is not one of #1 to #5601|cannot be given)"):
+        parse_program(text, MACHINE)

@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -64,6 +66,20 @@ class Bench:
         if wrong and not whole_again(self):
             wrong.append("the next run does not mend it")
         return {"exits": [end for end, _ in ends], "said": ends[0][1][-200:], "wrong": wrong} | more
+
+
+@contextmanager
+def mounted(place: Path, options: str) -> Iterator[bool]:
+    """A file system in memory; False where this process may not mount one."""
+    place.mkdir(exist_ok=True)
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(place)], capture_output=True, check=False
+    )
+    try:
+        yield done.returncode == 0
+    finally:
+        if done.returncode == 0:
+            subprocess.run(["umount", "-l", str(place)], check=True)
 
 
 def _listen_to_interrupts() -> None:

@@ -1,4 +1,4 @@
-"""Kinds of faults at the kernels that are kept, and files that are made to do harm (benchmarks/faults/kinds.py has the others)."""
+"""Kinds of faults at the kernels that are kept (benchmarks/faults/kinds.py has the others)."""
 
 from __future__ import annotations
 
@@ -6,24 +6,20 @@ import hashlib
 import os
 import pickle
 import random
-import resource
 import shutil
 import signal
+import subprocess
 import time
-import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from benchmarks.faults.bench import Bench, after, ended
+from benchmarks.faults.bench import Bench, after, ended, mounted
+from planner.base.kernel_files import PACKAGE
 
 STOP = ("plan", "a.ngc", "-o", "out", "-q", "--method", "stop")
 COMPILING = 12.0  # in which it is ended: about as long as compiling what `STOP` needs takes [s]
 DIGEST = hashlib.sha256().digest_size
 STRANGER = 54321  # a user that is not there
-ADDRESSES = 6 << 30  # of memory for a bomb [bytes]
 # A command, and then the kernels that it has used.
 USED = """
 from planner.base.kernel_files import used
@@ -31,11 +27,7 @@ from planner.cli import app
 app(standalone_mode=False)
 print(*used(), sep=chr(10))
 """
-SECONDS = 40  # of processor time for a bomb [s]
-GIBIBYTE = 1 << 30
-
-
-# ------------------------------------------------------------------------------------------ kernels
+NO_HOME = ("HOME", "XDG_", "MPL", "NUMBA_CACHE_DIR")  # variables that say where files may be kept
 
 
 def with_cache(cache: Path, **more: str) -> dict[str, str]:
@@ -182,94 +174,55 @@ def planted(bench: Bench, rng: random.Random) -> dict[str, Any]:
     return row | {"wrong": row["wrong"] + ran}
 
 
-# ------------------------------------------------------------------------------------------ bombs
+def no_room(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """Kernels are missing, and the disk where they are to be kept is full: they are compiled, one warning says it, and no part is
+    left there."""
+    place = bench.folder / "full"
+    with mounted(place, "size=16m") as there:
+        shutil.rmtree(place / "planner", ignore_errors=True)
+        shutil.copytree(warm(bench) / "planner", place / "planner")
+        missing = rng.sample(sorted(place.rglob("*.kernel")), 2)
+        for path in missing:
+            path.unlink()
+        if there:
+            _fill(place / "planner" / "filling", rng.choice([0, 1, 8]) << 10)
+        end = bench.run(*STOP, env=with_cache(place))
+        (place / "planner" / "filling").unlink(missing_ok=True)
+        wrong = unsound(place)
+        shutil.rmtree(place / "planner")
+    row = bench.row([end], (0,), mounted=there, missing=[path.name for path in missing])
+    if there and end[1].count("cannot be kept") != 1:
+        wrong.append(f"said: {end[1][-300:]}")
+    return row | {"wrong": row["wrong"] + wrong}
 
 
-def _zipped(place: Path) -> Path:
-    """A trajectory of 2 GiB of zeros in some megabytes, whose columns differ in length."""
-    file = place / "bomb.npz"
-    header = np.lib.format.header_data_from_array_1_0(np.zeros(1)) | {"shape": (GIBIBYTE // 4,)}
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        with archive.open("t.npy", "w", force_zip64=True) as opened:
-            np.lib.format.write_array_header_1_0(opened, header)  # type: ignore[arg-type]
-            for _ in range(2 * 64):
-                opened.write(bytes(GIBIBYTE // 64))
-        with archive.open("x.npy", "w") as opened:
-            np.lib.format.write_array(opened, np.zeros(16))  # type: ignore[arg-type]
-    return file
+def _fill(file: Path, room: int) -> None:
+    """All but so many bytes of a disk."""
+    with open(file, "wb", buffering=0) as opened:
+        try:
+            while True:
+                opened.write(bytes(4096))
+        except OSError:
+            opened.truncate(max(opened.tell() - room, 0))
 
 
-def _columns(place: Path) -> Path:
-    """A trajectory of 2e8 rows in a few kilobytes."""
-    import pyarrow
-    import pyarrow.parquet
-
-    file = place / "bomb.parquet"
-    rows = 10_000_000
-    table = pyarrow.table({name: np.zeros(rows) for name in ("t", "x")})
-    with pyarrow.parquet.ParquetWriter(file, table.schema, compression="zstd") as writer:
-        for _ in range(20):
-            writer.write_table(table, row_group_size=rows)
-    return file
-
-
-def _settings(place: Path, text: str) -> Path:
-    file = place / "bomb.toml"
-    file.write_text(text)
-    return file
-
-
-def _program(place: Path, text: str) -> Path:
-    file = place / "bomb.ngc"
-    file.write_text(text)
-    return file
-
-
-def _judged(file: Path) -> list[str]:
-    return ["verify", file.name, "a.ngc", "-q"]
-
-
-def _on_machine(file: Path) -> list[str]:
-    return ["plan", "a.ngc", "-m", file.name, "-q"]
-
-
-def _read(file: Path) -> list[str]:
-    return ["plan", file.name, "-q", "--method", "stop"]
-
-
-LINE = 10_000_000  # characters
-DEEP = 100_000  # brackets, tables, digits
-BOMBS: dict[str, Callable[[Path], list[str]]] = {
-    "npz": lambda place: _judged(_zipped(place)),
-    "parquet": lambda place: _judged(_columns(place)),
-    "toml, deep": lambda place: _on_machine(_settings(place, "[" + ".".join("a" * DEEP) + "]\n")),
-    "toml, wide": lambda place: _on_machine(_settings(place, "".join(f"[t{n}]\n" for n in range(DEEP)))),
-    "toml, nested": lambda place: _on_machine(_settings(place, "a = " + "[" * DEEP + "]" * DEEP)),
-    "toml, digits": lambda place: _on_machine(_settings(place, "dt = " + "9" * DEEP)),
-    "toml, large": lambda place: _on_machine(_settings(place, "# " + "a" * LINE)),
-    "line": lambda place: _read(_program(place, "G21 G90 F600\nG1 X" + "1" * LINE + "\n")),
-    "comment": lambda place: _read(_program(place, "G21 G90 F600\n(" + "a" * LINE + ")\nG1 X1\nM2\n")),
-    "words": lambda place: _read(_program(place, "G21 G90 F600\nG1" + " X1" * (LINE // 3) + "\nM2\n")),
-    "brackets": lambda place: _read(_program(place, "G21 G90 F600\nG1 X" + "[" * DEEP + "1" + "]" * DEEP + "\n")),
-    "loop": lambda place: _read(_program(place, "F600\no1 while [1]\nG1 X1\nX0\no1 endwhile\nM2\n")),
-    "calls": lambda place: _read(_program(place, "o1 sub\no1 call\no1 call\no1 endsub\nF600\no1 call\nM2\n")),
-}  # fmt: skip
-
-
-def bomb(bench: Bench, rng: random.Random) -> dict[str, Any]:
-    """A small file that asks for much: a sentence within some seconds and gigabytes. All kinds in turn."""
-    bench.turn = (bench.turn + 1) % len(BOMBS)
-    kind = list(BOMBS)[bench.turn]
-    words = BOMBS[kind](bench.folder)
-
-    def lower() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-
-    used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    end = bench.run(*words, preexec_fn=lower)
-    used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used
-    for path in bench.folder.glob("bomb.*"):
-        path.unlink()
-    allowed = (0,) if kind == "comment" else (2, 3)
-    return bench.row([end], allowed, bomb=kind, cpu=round(used, 1), words=len(end[1].split()))
+def read_only_package(bench: Bench, rng: random.Random) -> dict[str, Any]:
+    """A package that nobody can write, on a system without a home: it plans, also where a kernel is missing."""
+    place, kernels = bench.folder / "package", Path("planner/kernels")
+    with mounted(place, "size=64m") as there:
+        ignored = shutil.ignore_patterns("__pycache__", "kernels")
+        shutil.copytree(PACKAGE, place / "planner", ignore=ignored, dirs_exist_ok=True)
+        shutil.copytree(warm(bench) / "planner", place / kernels, dirs_exist_ok=True)
+        missing = rng.random() < 0.5
+        if missing:
+            rng.choice(sorted((place / kernels).iterdir())).unlink()
+        if there:
+            subprocess.run(["mount", "-o", "remount,ro", str(place)], check=True)
+        environment = {name: value for name, value in os.environ.items() if not name.startswith(NO_HOME)}
+        environment |= {"PYTHONPATH": str(place), "HOME": "/proc/self"}
+        end = bench.run(*STOP, env=environment)
+        if not there:
+            shutil.rmtree(place)
+    row = bench.row([end], (0,), mounted=there, missing=missing)
+    told = [] if ("cannot be kept" in end[1]) == (missing and there) else [f"said: {end[1][-300:]}"]
+    return row | {"wrong": row["wrong"] + told}

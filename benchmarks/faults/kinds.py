@@ -7,16 +7,27 @@ import os
 import random
 import resource
 import signal
-import subprocess
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from benchmarks.faults import hostile
-from benchmarks.faults.bench import ENDS, HIDDEN, INTERRUPTED, JOBS, PATIENCE, Bench, after, ended, not_whole
+from benchmarks.faults import bombs, hostile
+from benchmarks.faults.bench import (
+    ENDS,
+    HIDDEN,
+    INTERRUPTED,
+    JOBS,
+    PATIENCE,
+    Bench,
+    after,
+    ended,
+    mounted,
+    not_whole,
+)
+
+MANY = 20_000  # moves of a job that takes some memory
 
 
 def plan_words(rng: random.Random) -> list[str]:
@@ -82,20 +93,6 @@ def interrupt(bench: Bench, rng: random.Random) -> dict[str, Any]:
 
 
 # ------------------------------------------------------------------------------------------ places
-
-
-@contextmanager
-def mounted(place: Path, options: str) -> Iterator[bool]:
-    """A file system in memory; False where this process may not mount one."""
-    place.mkdir(exist_ok=True)
-    done = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(place)], capture_output=True, check=False
-    )
-    try:
-        yield done.returncode == 0
-    finally:
-        if done.returncode == 0:
-            subprocess.run(["umount", "-l", str(place)], check=True)
 
 
 WRITES = (
@@ -182,14 +179,18 @@ def no_home(bench: Bench, rng: random.Random) -> dict[str, Any]:
 
 
 def memory(bench: Bench, rng: random.Random) -> dict[str, Any]:
-    """Little address space, from not enough for the imports on."""
-    limit = int(rng.uniform(60, 1500)) << 20
+    """Little address space, from not enough for the imports on; now and then for a job of many moves."""
+    limit, words = int(rng.uniform(60, 1500)) << 20, plan_words(rng)
+    if rng.random() < 0.3:
+        many = bench.folder / "many.ngc"
+        many.write_text(JOBS["a"] + "".join(f"X{n} Y{n % 2}\n" for n in range(MANY)))
+        words = ["plan", many.name, "-o", "out", "-q", "--method", rng.choice(["stop", "kinematic"])]
 
     def lower() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
-    end = bench.run(*plan_words(rng), preexec_fn=lower)
-    return bench.row([end], limit_MB=limit >> 20)
+    end = bench.run(*words, preexec_fn=lower)
+    return bench.row([end], limit_MB=limit >> 20, job=words[1])
 
 
 # ------------------------------------------------------------------------------------------ others at the same files
@@ -293,5 +294,7 @@ KINDS: dict[str, Callable[[Bench, random.Random], dict[str, Any]]] = {
     "first-runs": hostile.first_runs,
     "damaged-kernels": hostile.damaged,
     "planted-kernels": hostile.planted,
-    "bomb": hostile.bomb,
+    "no-room-for-kernels": hostile.no_room,
+    "read-only-package": hostile.read_only_package,
+    "bomb": bombs.bomb,
 }

@@ -63,7 +63,7 @@ def mended(
     edges = without_stands(np.stack(stands, axis=1), edges.ravel())[0].reshape(-1, 2)
     if again >= EVERYWHERE and slower.max() <= 1.0 + LITTLE:
         edges, by = np.array([[0.0, np.inf]]), np.array([TWICE * (slower.max() - 1.0) + MORE])
-    w, pad = _reach(verdict), PERIODS * dt
+    w, pad = reach_of(verdict), PERIODS * dt
     jerk_limited = any(name.startswith("jerk") and check.limited for name, check in verdict.limits.items())
     if isinstance(motion, ShapedMotion):  # what its copies are of
         edges[:, 0] -= motion.shaper.length
@@ -126,17 +126,21 @@ def _rests(
     return first(edges[low:k][::-1], 0.0), first(edges[n:high], np.inf)
 
 
-def _reach(verdict: Verdict) -> float:
+def reach_of(verdict: Verdict) -> float:
     """How far before and behind a place a motion has to be slower [s], by its verdict (motion/slowed.py)."""
     groups = {name.partition(".")[2] for name, check in verdict.limits.items() if check.limited} - {""}
+
+    def largest(quantity: str, name: str) -> float:
+        """What the motion has of it at most; along the path, where that alone is not judged, no more than of all axes together."""
+        own = verdict.limits.get(f"{quantity}.{name}")
+        of_axes = (check for each, check in verdict.limits.items() if each.startswith(f"{quantity}."))
+        return float(np.linalg.norm([each.value for each in ([own] if own is not None else of_axes)]))
+
     found = [0.0]
     for name in groups:
-        checks = [
-            verdict.limits.get(f"{quantity}.{name}") for quantity in ("velocity", "acceleration", "jerk")
-        ]
-        v = 0.0 if checks[0] is None or checks[0].ratio <= 0.0 else checks[0].value
-        A, J = (check.limit if check is not None and check.limited else np.inf for check in checks[1:])
-        if not np.isfinite(A):
-            A = checks[1].value if np.isfinite(J) and checks[1] is not None else np.inf
-        found.append(reach(v, A, J))
+        checks = (verdict.limits.get(f"{quantity}.{name}") for quantity in ("acceleration", "jerk"))
+        A, J = (check.limit if check is not None and check.limited else np.inf for check in checks)
+        if np.isfinite(J) and not np.isfinite(A):
+            A = largest("acceleration", name)
+        found.append(reach(largest("velocity", name), A, J))
     return max(found)

@@ -14,6 +14,7 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, Literal
 
 import numpy as np
@@ -41,6 +42,7 @@ TIME_STEP_MIN = 1e-9
 # numbers any more.
 VALUE_MAX = 1e30
 NUMBER_MAX = 2.0**31 - 1.0  # of a line or a block
+NAMES_SHOWN = 300  # characters of the names of columns
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -136,11 +138,10 @@ def _read_parquet(path: Path) -> tuple[dict[str, Any], str]:
 
     with open(path, "rb") as stream:  # pyarrow takes no name that is not UTF-8
         file = parquet.ParquetFile(stream)
-        about = file.metadata
         names = file.schema_arrow.names
-        require_room(path, {name: (about.num_rows,) for name in names if _known(name)})
-        text = (file.schema_arrow.metadata or {}).get(b"planner", b"").decode()
         wanted = [name for name in names if _known(name)]
+        require_room(path, dict.fromkeys(wanted, (file.metadata.num_rows,)))
+        text = (file.schema_arrow.metadata or {}).get(b"planner", b"").decode()
         table = file.read(wanted)  # others are named, and not read
     return {name: table[name].to_numpy() if name in wanted else () for name in names}, text
 
@@ -211,8 +212,8 @@ def _assemble(
     if "t" not in columns or not axes:
         missing = "column 't' is missing" if "t" not in columns else "there is no column of an axis"
         raise InputError(
-            f"{missing}; found are {', '.join(found) or 'none'}; needed are t [s] and "
-            "the positions x, y, ... [mm, rotary axes degrees]",
+            f"{missing}; found are {shorten(', '.join(found), NAMES_SHOWN, placeholder=' ...') or 'none'}; "
+            "needed are t [s] and the positions x, y, ... [mm, rotary axes degrees]",
             source=source,
         )
     lengths = {name: len(column) for name, column in columns.items()}

@@ -14,7 +14,7 @@ from planner.delivery.periods import Standing
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Joint
 from planner.machine import load_machine
-from planner.motion.slowed import Slowed
+from planner.motion.slowed import Slowed, reach
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job
 from planner.planning.job.stages import Stages
@@ -227,3 +227,17 @@ def test_an_excess_at_a_rest_is_of_the_run_behind_it_and_then_of_both(again, bef
     slower = mending.mended(motion, NO_STANDS, verdict, MACHINE.dt, again)
     lasting = np.diff(slower.run_at(np.array([at - 0.004, at, at + 0.004]))) / 0.004
     np.testing.assert_allclose(lasting, [before, 1.1 ** (1.0 / 3.0)], rtol=1e-3)
+
+
+def test_a_limit_along_the_path_reaches_as_far_as_what_all_axes_do_asks_for():
+    """Speed and acceleration along the path are no more than those of all axes together; the path has no limits of them here."""
+    machine = MACHINE.model_copy(update={"normal_acceleration": None, "tangential_jerk": 2e4})
+    text = "G21 G90 G64 P0.03 F5400\nG1 X14\nX22 Y9\nG2 X30 Y17 I8 J0\nG1 X9 Y26\nX0 Y4\nM2\n"
+    made = plan(parse_program(text, machine), machine, method="bezier")
+    verdict = made.verdict
+    assert verdict.limits["jerk.tangential"].limited
+    assert "acceleration.tangential" not in verdict.limits
+    t = made.trajectory
+    v, a = np.linalg.norm(t.velocity, axis=1).max(), np.abs(np.diff(t.feed) / np.diff(t.t)).max()
+    least = reach(v, a, 2e4)
+    assert least <= mending.reach_of(verdict) < 10.0 * least

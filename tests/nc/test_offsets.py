@@ -37,6 +37,7 @@ def last(text: str) -> list[float]:
         ("G92 X0\nG52 X3\nG92.2\nG0 X0\nG92.3 G0 X0", [3, 2, 3]),
         ("G43 H1\nG0 Z0", [1, 2, 25]),
         ("G43 H2\nG43.2 H1\nG0 X0 Z0", [4, 2, 35]),
+        ("G43 H2\nG43.2 H0\nG0 X0 Z0", [4, 2, 10]),  # no tool has no length
         ("G43.1 Z5\nG0 Z0\nG49\nG0 Z1", [1, 2, 1]),
         ("G43.1 X5 Z1\nG43.1 Z2\nG43.2 Y1\nG0 X0 Y0 Z0", [5, 1, 2]),
         ("G10 L1 P1 Z7\nG43 H1\nG10 L1 P1 Z9\nG0 Z0", [1, 2, 7]),

@@ -46,6 +46,7 @@ def test_a_factor_holds_for_the_default_feed_inches_and_rotary_axes_too() -> Non
     assert parse_program("G21 M3\nM220 S25\nG1 X1", four).feed[0] == pytest.approx(2.0)
     assert parse_program("G20\nM220 S25\nF10 G1 X1", four).feed[0] == pytest.approx(25.4 * 2.5 / 60)
     assert parse_program("G21\nM220 S25\nF60 G1 A90", four).feed[0] == pytest.approx(np.deg2rad(0.25))
+    assert parse_program("G21 F600\nM220 S0.5\nG1 X1", four).feed[0] == pytest.approx(0.05)
 
 
 def test_marlin_keeps_a_factor_and_brings_it_back() -> None:

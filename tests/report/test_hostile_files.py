@@ -98,6 +98,14 @@ def test_a_parquet_file_of_more_rows_than_a_day_is_refused_by_its_footer(tmp_pat
     assert peak(file, "verify a part of the motion") < 20e6
 
 
+def test_of_very_many_columns_the_first_are_named(tmp_path: Path) -> None:
+    np.savez(tmp_path / "wide.npz", t=np.arange(4.0), **{f"load{n}": np.zeros(4) for n in range(900)})
+    with pytest.raises(InputError, match="no column of an axis; found are t, load0, load1, ") as fault:
+        read_trajectory(tmp_path / "wide.npz")
+    assert "needed are t [s] and the positions" in str(fault.value)
+    assert len(str(fault.value)) < 1_000
+
+
 def test_too_little_memory_is_told_by_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "trajectory.npz"
     write_trajectory(file, make_plan().trajectory)

@@ -49,3 +49,11 @@ def test_dwells_are_nothing_of_the_motion() -> None:
     total = 50.0 / FEED + FEED / A + 0.75
     found = held(f"G21 G1 X20 F{60 * FEED}\nG4 P0.75\nX50\n", machine())
     assert found["rest"] == pytest.approx(0.75 / (total + FEED / A), abs=0.005)
+
+
+@pytest.mark.parametrize(("share", "is_held"), [(0.993, True), (0.987, False)])
+def test_within_one_percent_of_a_limit_is_at_it(share: float, is_held: bool) -> None:
+    """At a feed that is this share of what the axis can do, for most of a long move."""
+    found = held(f"G21 G1 X400 F{60 * share * V}\n", machine())
+    assert found["feed"] > 0.9
+    assert (found.get("velocity.x", 0.0) > 0.9) == is_held

@@ -270,7 +270,7 @@ def _at_speed(i, between, V, line, a_max, T1, T2):
     while last + 1 < high and s[last + 1] - s[i] < reach and last - i < FLOW_JOINTS:
         last += 1
     if i - first == FLOW_JOINTS or last - i == FLOW_JOINTS:
-        return _at_speed_dense(i, between, V, line, a_max, T1, T2)
+        return at_speed_dense(i, between, V, line, a_max, T1, T2)
     error_sq, bend_sq, over = 0.0, 0.0, 0.0
     for c in range(direction.shape[1]):
         error, acceleration = 0.0, 0.0
@@ -290,8 +290,8 @@ def _at_speed(i, between, V, line, a_max, T1, T2):
 
 
 @njit(cache=True, error_model="numpy")
-def _at_speed_dense(i, between, V, line, a_max, T1, T2):
-    """The same by two nodes, -+V x with weights w, that have the kernel's second and fourth moment."""
+def at_speed_dense(i, between, V, line, a_max, T1, T2):
+    """`_at_speed` by two nodes, -+V x with weights w, that have the kernel's second and fourth moment."""
     s, point, direction, (low, high) = line.s, line.point, line.direction, between
     second, fourth = (T1 * T1 + T2 * T2) / 12.0, (T1**4 + T2**4) / 80.0 + T1 * T1 * T2 * T2 / 24.0
     x, weight = np.sqrt(fourth / second), second * second / (2.0 * fourth)

@@ -94,7 +94,10 @@ class _Function:
 
     def _body(self, body: Sequence[tree.Statement]) -> None:
         for statement in body:
-            _WRITE[type(statement)](self, statement)
+            try:
+                _WRITE[type(statement)](self, statement)
+            except OverflowError:
+                raise tree.ProgramFault(statement.place, "a number is too large") from None
 
     def _plain_rows(self, plain: tree.PlainRows) -> None:
         self.blocks.put(f"S({self.rows.add_entry(plain.first, plain.last)})", plain.place)

@@ -136,7 +136,7 @@ class Expressions:
         self.language = language
 
     def value(self, expression: tree.Expression) -> str:
-        """Python text of a number."""
+        """Python text of a number. Raises OverflowError for a number that is too large."""
         text, logical = self._expression(expression, raw=False)
         return f"(1.0 if {text} else 0.0)" if logical else text
 
@@ -164,6 +164,8 @@ class Expressions:
         """Python text, and whether it is true or false rather than a number."""
         language = self.language
         if isinstance(expression, tree.Number):
+            if math.isinf(expression.value):  # more digits than there are numbers for
+                raise OverflowError
             return (repr(expression.value) if expression.value >= 0 else f"({expression.value!r})"), False
         if isinstance(expression, tree.Named):
             name = expression.name

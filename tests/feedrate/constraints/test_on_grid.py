@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -71,6 +72,10 @@ def test_on_a_spline_chords_have_what_it_leaves_and_beside_it_all_of_the_toleran
     np.testing.assert_array_equal(left[span >= 0], path.spline.budget[span[span >= 0]])
     assert left[span >= 0].max() < machine.tolerance
     assert left[straight] == pytest.approx(machine.tolerance)
+    alone = span == 0
+    kept = {name: getattr(samples, name)[alone] for name in ("element", "segment")}
+    of_one = remaining_budget(SimpleNamespace(path=path, table=samples.table, **kept))
+    np.testing.assert_array_equal(of_one, path.spline.budget[0], "a curve that is one element")
 
 
 def test_the_normal_acceleration_of_a_circle_is_told_as_it_is():

@@ -116,3 +116,27 @@ def test_what_a_plotter_would_do_otherwise_is_said_first(word: str) -> None:
     with pytest.raises(InputError, match=r"assumed without --strict"):
         parse_program(text, MACHINE, Reading(strict=True))
     assert parse_program(text.replace(word, "LT"), MACHINE).assumptions == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("G21 G90 F600\n#1=[{}]\nG1 X#1\nM2\n", "2:1: #1"),
+        ("G21 G90 F600\nG1 X[{} * 0]\nM2\n", "2:1: G1"),
+        ("G21 G90 F600\no1 if [1 lt {}]\nG1 X1\no1 endif\nM2\n", "2:1: o1"),
+        ("O1\nG21 G90 F600\n#100={}.\nIF[#100GT1.]GOTO5\nN5G1 X1.\nM30\n", "3:1: #100"),
+        ("DEF REAL A={}\nG1 G90 F600 X=A\nM30\n", "1:1: DEF"),
+        ("0 BEGIN PGM A MM\n1 L X+{} F100\n2 END PGM A MM\n", "2:3: L"),
+    ],
+)
+def test_more_digits_than_there_are_numbers_for_are_refused_with_their_line(text: str, place: str) -> None:
+    """They are infinite, which Python has no literal for; an infinite number times nothing would be a word left out."""
+    with pytest.raises(InputError, match=rf":{place}.*: a number is too large"):
+        parse_program(text.format("1" * 400), MACHINE)
+
+
+@pytest.mark.parametrize("number", [0, -1, 5602, 6000])
+def test_a_computed_parameter_that_there_is_not_is_refused(number: int) -> None:
+    text = f"G21 G90 F600\n#1={number}\n#[#1]=2\nG1 X1\nM2\n"
+    with pytest.raises(InputError, match=rf":3:.*#{number} (is not one of #1 to #5601|cannot be given)"):
+        parse_program(text, MACHINE)

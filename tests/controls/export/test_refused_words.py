@@ -1,0 +1,37 @@
+"""Words that a control is not given: curves that cannot be written as lines, and codes that it does not have."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+import planner
+from planner.base.errors import InputError
+from planner.controls.export.candidates import Candidates
+from planner.controls.export.controls import CONTROLS, is_setting
+
+CURVE = "G21 G90\nG0 Z1\nG5.2 P1 X4 Y2 L3 F600\nP1 X6 Y3\nP1 X8 Y1\nG5.3\nM2\n"
+
+
+def test_a_curve_that_no_straight_moves_can_say_is_refused_with_its_line() -> None:
+    """The program does not place X and Y before it."""
+    made = planner.plan(planner.read_program(text=CURVE, machine="mill"), "mill", method="stop")
+    job = Candidates(made, CONTROLS["grbl"], 0.05)
+    (one,) = job.own(1e-3)
+    with pytest.raises(InputError, match=r"G5\.2 \(it cannot be written as straight moves") as fault:
+        job.written(one)
+    assert fault.value.line == 3
+
+
+@pytest.mark.parametrize(("code", "known"), [(1090, True), (1091, False), (990, False), (991, False)])
+def test_a_setting_is_a_whole_code_that_the_control_has(code: int, known: bool) -> None:
+    """M109 is one of a printer, M109.1 and M99 are not; codes are in tenths."""
+    words = [SimpleNamespace(letter="M", code=code), SimpleNamespace(letter="S", code=0)]
+    assert is_setting(words, CONTROLS["klipper"]) == known
+
+
+def test_grbl_has_the_codes_of_its_page() -> None:
+    """Those that grbl 1.1 lists as supported, but for probing (doc/markdown/commands.md and README of gnea/grbl)."""
+    page = "0 1 2 3 4 10 17 18 19 20 21 28 28.1 30 30.1 40 43.1 49 53 54 55 56 57 58 59 61 80 90 91 91.1 92 92.1 93 94"
+    assert CONTROLS["grbl"].g == {round(10 * float(code)) for code in page.split()}

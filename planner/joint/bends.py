@@ -101,6 +101,12 @@ def _of_curve(shape, length, x):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
+def _chosen(condition, a, b):
+    """`where` of three numbers."""
+    return where(condition, a[0], b[0]), where(condition, a[1], b[1]), where(condition, a[2], b[2])
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def _put_leg(axes, group, i, x, out):
     """out (3, A): the point of a step's leg at the place x, and two derivatives."""
     rate = group.rate[i]
@@ -114,20 +120,10 @@ def _put_leg(axes, group, i, x, out):
     is_curve = group.shape[i, 0] > 0.0
     if anywhere(is_curve):
         by_1, by_2, by_3 = _of_curve(group.shape[i], group.length[i], x)
-        of_1 = (
-            where(is_curve, by_1[0], of_1[0]),
-            where(is_curve, by_1[1], of_1[1]),
-            where(is_curve, by_1[2], of_1[2]),
-        )
-        of_2 = (
-            where(is_curve, by_2[0], of_2[0]),
-            where(is_curve, by_2[1], of_2[1]),
-            where(is_curve, by_2[2], of_2[2]),
-        )
-        of_3 = (
-            where(is_curve, by_3[0], of_3[0]),
-            where(is_curve, by_3[1], of_3[1]),
-            where(is_curve, by_3[2], of_3[2]),
+        of_1, of_2, of_3 = (
+            _chosen(is_curve, by_1, of_1),
+            _chosen(is_curve, by_2, of_2),
+            _chosen(is_curve, by_3, of_3),
         )
     for k in range(axes):
         w_1, w_2, w_3 = group.way[i, 0, k], group.way[i, 1, k], group.way[i, 2, k]

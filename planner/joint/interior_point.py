@@ -45,9 +45,6 @@ MELT = 0.8  # by which prox falls in each of these iterations, as far as `Tuning
 # Second-order terms of Mehrotra's corrector count where the predictor goes this share of its way [-]: behind
 # a short step they lead astray.
 PREDICTED = 0.3
-# Multipliers stay so large that no s z is less than this share of what it is to become [-]: a row with less stops steps
-# at its bound (Waechter & Biegler 2006, eq. 16). With it windows on arcs take a tenth fewer iterations.
-LEAST = 0.5
 # Largest gap of the kinematics at the end, in mean steps [-]: `closed_at_nodes` adds those of fifty steps up.
 # The last gap stays at 1e-9 once durations hardly change.
 OFF = 2e-9
@@ -191,7 +188,7 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
         lambda_end[k] = zero
     looking = room.y, wide2(work.nearest, width, THREE), wide1(work.top, width)
     count = put_present(sizes, group, rows)
-    put_rows(sizes, group, held, x, u, rows, zero, zero, zero, looking, scratch)
+    put_rows(sizes, group, held, x, u, rows, zero, zero, looking, scratch)
     gap_most, off = gaps(sizes, group, x, u, gap)
     time = _durations(sizes, group, u, zero)
     products, broken = _start(sizes, rows, count, time, tune)
@@ -265,7 +262,4 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
             gap_most, off = gaps(sizes, group, x, u, gap)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]
-        least = LEAST * aim
-        products, broken, owed = put_rows(
-            sizes, group, held, x, u, rows, along, dual, least, looking, scratch
-        )
+        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)

@@ -172,6 +172,12 @@ def root(typingctx, a):
 
 
 @intrinsic_of
+def whole(typingctx, a):
+    """The largest whole number that is not above a."""
+    return _of(a)(_of(a)), _function("floor")
+
+
+@intrinsic_of
 def magnitude(typingctx, a):
     """The absolute value."""
     return _of(a)(_of(a)), _function("fabs")

@@ -230,15 +230,32 @@ def _quintic(b1, b2, b3, b4, t):
 
 
 @njit(cache=True, error_model="numpy")
-def _parameter(p0, p1, p2, p3, w1, w2, length, x):
-    """u and three derivatives by t at x = length t (module text)."""
+def _ordinates(p0, p1, p2, p3, w1, w2, length):
+    """The inner four of the Bernstein ordinates of u(t) (module text)."""
     rate, along = _at_end(p0, p1, p2, w1, w2)
     b1 = length / (5.0 * rate)
     b2 = 2.0 * b1 - length * length * along / (20.0 * rate**4)
     rate, along = _at_end(p3, p2, p1, w2, w1)
     b4 = length / (5.0 * rate)
     b3 = 2.0 * b4 - length * length * along / (20.0 * rate**4)
-    return _quintic(b1, b2, 1.0 - b3, 1.0 - b4, x / length)
+    return b1, b2, 1.0 - b3, 1.0 - b4
+
+
+@njit(cache=True, error_model="numpy")
+def ordinates(points, weight, length):
+    """(K, 4) the inner Bernstein ordinates of u(t) of curves: points (K, 4, A), weight (K, 2), length (K,) [mm]."""
+    out = np.empty((len(length), 4))
+    for n in range(len(length)):
+        p, w = points[n], weight[n]
+        out[n] = _ordinates(p[0], p[1], p[2], p[3], w[0], w[1], length[n])
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _parameter(p0, p1, p2, p3, w1, w2, length, x):
+    """u and three derivatives by t at x = length t (module text)."""
+    b1, b2, b3, b4 = _ordinates(p0, p1, p2, p3, w1, w2, length)
+    return _quintic(b1, b2, b3, b4, x / length)
 
 
 @njit(cache=True, error_model="numpy")

@@ -67,7 +67,8 @@ def _put_bent_row(sizes, group, rows, i, which, m, x, u, row):
         v, a, j = x[axes + k], x[2 * axes + k], u[k]
         by_p, by_v, by_a, by_j = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h
         if which <= 2:
-            n, f = rows.n[i, 3 * m + which, k], rows.node[i, 3 * m + which, k]
+            c = 3 * m + which
+            n, f = rows.n[i, c, k], rows.by_node[i, c] * tangent_of(sizes, rows, i, c, k)
             w = v + group.sag[m] * j
             if which == 1:  # and the node
                 by_p, by_v, by_h = n + f, THIRD * h * n, by_h + THIRD * w * n
@@ -77,12 +78,12 @@ def _put_bent_row(sizes, group, rows, i, which, m, x, u, row):
                 by_h += THIRD * (2.0 * w + h * a) * n + (w + h * (a + 0.5 * h * j)) * f
             by_p, by_v, by_a, by_j = of_state(group.sag[m], by_p, by_v, by_a, by_j)
         elif which == 3:
-            by_v = -tangent_of(sizes, group, rows, i, 0, k) / group.pace[i]
+            by_v = -tangent_of(sizes, rows, i, 0, k) / group.pace[i]
         elif which == 4:
-            by_v = -tangent_of(sizes, group, rows, i, 1, k) / group.pace[i]
+            by_v = -tangent_of(sizes, rows, i, 1, k) / group.pace[i]
             by_a, by_h = 0.5 * h * by_v, by_h + 0.5 * a * by_v
         else:
-            n = tangent_of(sizes, group, rows, i, 1, k) * group.per_step[i]
+            n = tangent_of(sizes, rows, i, 1, k) * group.per_step[i]
             by_v, by_a, by_h = h * n, 0.5 * h * h * n, by_h + (v + h * a) * n
         row[k], row[axes + k], row[2 * axes + k], row[3 * axes + k] = by_p, by_v, by_a, by_j
     row[4 * axes] = by_h
@@ -247,14 +248,14 @@ def add_normal(sizes, group, rows, i, x, u, W):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def add_laws(sizes, group, bends, rows, i, x, u, W, scratch):
+def add_laws(sizes, group, held, rows, i, x, u, W, scratch):
     """W += the curvature of the rows of the laws."""
     more = 8 * len(sizes.axes) + LAW_ROWS
-    copy_step(sizes, bends.at, x[i], u[i], scratch)
+    copy_step(sizes, held.at, x[i], u[i], scratch)
     for r in range(sizes.rows - more):
         scratch.g[r] = rows.z[i, more + r]
     scratch.W[:] = 0.0
-    add_law_curvature(scratch.W, bends.laws, i, group.pace[i], scratch.x, scratch.u, scratch.g)
-    for s in range(len(bends.at)):
+    add_law_curvature(scratch.W, held.laws, i, group.pace[i], scratch.x, scratch.u, scratch.g)
+    for s in range(len(held.at)):
         for t in range(s + 1):
-            W[bends.at[s], bends.at[t]] += scratch.W[s, t]
+            W[held.at[s], held.at[t]] += scratch.W[s, t]

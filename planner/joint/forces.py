@@ -73,8 +73,8 @@ def put_force(sizes, group, rows, i, x, u, first, aim, second, w):
         arc = push_of(rows, i, more + ARC, first, aim, second) * group.per_step[i]
         for k in range(axes):
             v, a, j = x[axes + k], x[2 * axes + k], u[k]
-            at_mid = tangent_of(sizes, group, rows, i, 1, k)
-            w[axes + k] += (h * arc - mid) * at_mid - node * tangent_of(sizes, group, rows, i, 0, k)
+            at_mid = tangent_of(sizes, rows, i, 1, k)
+            w[axes + k] += (h * arc - mid) * at_mid - node * tangent_of(sizes, rows, i, 0, k)
             w[2 * axes + k] += 0.5 * h * (h * arc - mid) * at_mid
             total += ((v + h * a) * arc - 0.5 * a * mid) * at_mid
     if sizes.any_switch:
@@ -106,8 +106,9 @@ def _add_tube(sizes, group, rows, i, m, x, u, bent, first, aim, second, w):
         by_a, by_j = SIXTH * h * h * f_2, 0.0 * h
         total += THIRD * (w_k * f_1 + (2.0 * w_k + h * a) * f_2)
         if bent:
-            following = q_2 * rows.node[i, c + 2, k]
-            by_q, by_w = by_q + q_1 * rows.node[i, c + 1, k] + following, by_w + h * following
+            following = q_2 * rows.by_node[i, c + 2] * tangent_of(sizes, rows, i, c + 2, k)
+            by_q += q_1 * rows.by_node[i, c + 1] * tangent_of(sizes, rows, i, c + 1, k) + following
+            by_w += h * following
             by_a, by_j = by_a + 0.5 * h * h * following, h * h * h * SIXTH * following
             total += (w_k + h * (a + 0.5 * h * j)) * following
         by_p, by_v, by_a, by_j = of_state(sag, by_q, by_w, by_a, by_j)
@@ -128,9 +129,9 @@ def _tube_slopes(sizes, group, rows, i, m, x, u, d, bent):
         by_1 += rows.n[i, c + 1, k] * (dq + THIRD * (h * dw + w * dh))
         by_2 += rows.n[i, c + 2, k] * (dq + THIRD * (h * (2.0 * dw + 0.5 * h * da) + (2.0 * w + h * a) * dh))
         if bent:
-            by_1 += rows.node[i, c + 1, k] * dq
+            by_1 += rows.by_node[i, c + 1] * tangent_of(sizes, rows, i, c + 1, k) * dq
             following = dq + h * (dw + h * (0.5 * da + h * SIXTH * dj)) + (w + h * (a + 0.5 * h * j)) * dh
-            by_2 += rows.node[i, c + 2, k] * following
+            by_2 += rows.by_node[i, c + 2] * tangent_of(sizes, rows, i, c + 2, k) * following
     return by_0, by_1, by_2
 
 
@@ -168,8 +169,8 @@ def put_slopes(sizes, group, rows, i, x, u, d, out):
         node, mid, arc = none, none, none
         for k in range(axes):
             v, a, dv, da = x[axes + k], x[2 * axes + k], d[axes + k], d[2 * axes + k]
-            at_mid = tangent_of(sizes, group, rows, i, 1, k)
-            node += tangent_of(sizes, group, rows, i, 0, k) * dv
+            at_mid = tangent_of(sizes, rows, i, 1, k)
+            node += tangent_of(sizes, rows, i, 0, k) * dv
             mid += at_mid * (dv + 0.5 * (h * da + a * dh))
             arc += at_mid * (h * (dv + 0.5 * h * da) + (v + h * a) * dh)
         out[more + ORDER_NODE], out[more + ORDER_MID] = -node / group.pace[i], -mid / group.pace[i]

@@ -9,6 +9,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.views import size
+from planner.geometry.curves import ordinates
 from planner.joint.laws import LawRows
 from planner.joint.legs import LegFormulas
 from planner.joint.problem import StepWindow
@@ -29,7 +30,7 @@ class Sizes(NamedTuple):
     width: tuple[int, ...]  # W lanes
     steps: int  # N
     rows: int  # R
-    any_bent: bool  # whether there are legs that are no lines, or are passed
+    bends: int  # 1 where there are legs that are no lines, or are passed, else 0
     any_own: bool  # whether there are rows with derivatives of their own
     any_normal: bool  # whether there are rows of the normal acceleration
     any_laws: bool  # whether there are laws
@@ -49,6 +50,11 @@ class Group(NamedTuple):
     length: FloatArray  # (N, W)
     line: FloatArray  # (N, W) 1 where it is a line that is not passed
     bent: FloatArray  # (N, W) 1 where it is an arc or a curve that is not passed
+    passed: FloatArray  # (N, W) 1 where it is passed
+    target: FloatArray  # (N or 0, 3, A, W) as of `StepLimits`
+    way: FloatArray  # (N or 0, 3, A, W) the vectors of the leg's formula (bends.py)
+    rate: FloatArray  # (N or 0, W) of an arc
+    shape: FloatArray  # (N or 0, 6, W) of a curve both weights and the ordinates of u; 0 where it is none
     begins: FloatArray  # (N, W) 1 where the window's first step on a leg is
     ends: FloatArray  # (N, W) 1 for the last one
     at_vertex: FloatArray  # (N, W) 1 where the node is where the leg begins
@@ -77,21 +83,16 @@ class Group(NamedTuple):
     aside: FloatArray  # (1, W)
 
 
-class Bends(NamedTuple):
+class Held(NamedTuple):
     """Of a window that is searched by itself, what windows in lanes have not: their kernel is compiled without it."""
 
-    leg: Array  # (N,) of `legs`
-    bent: Array  # (N,) whether it is an arc or a curve
-    passed: Array  # (N,) whether it is passed
-    target: FloatArray  # (N or 0, 3, A)
-    legs: LegFormulas
     laws: LawRows
     at: Array  # (4 A + 1,) where the numbers of its step are among those of the kernel's
 
 
 def group_of(
     windows: list[StepWindow], width: int
-) -> tuple[Sizes, Group, Bends | None, FloatArray, FloatArray, FloatArray]:
+) -> tuple[Sizes, Group, Held | None, FloatArray, FloatArray, FloatArray]:
     """Up to `width` windows of one kind (window_solver.py), and x (N+1, S, W), u (N, C, W), place (N, 6, W) of them."""
     of = windows[0].u.shape[1] - 1
     axes = next((many for many in AXES if many >= of), of)
@@ -110,14 +111,21 @@ def group_of(
         """`stack` (.., A), with the axes that the kernel has beside."""
         return np.insert(stack(each, fill, rows), [of] * (axes - of), fill, axis=1)
 
+    def vectors(each: list[FloatArray]) -> FloatArray:
+        """`stack` (.., 3, A), of windows with bends."""
+        rows = stack(each) if bends else np.zeros((0, 3, of, width))
+        return np.insert(rows, [of] * (axes - of), 0.0, axis=2)
+
     def limit(name: str, fill: float = 0.0) -> FloatArray:
         return stack([getattr(one.limits, name) for one in windows], fill)
 
     legs, leg = _legs_of(windows)
+    way, rate, shape = _formulas_of(legs)
     square = (legs.drift**2).sum(axis=1)
     start = legs.base + legs.radius[:, None] * legs.e1
     passed = [one.limits.passed for one in windows]
     bent = [(legs.radius[at] > 0.0) & ~now for at, now in zip(leg, passed, strict=True)]
+    bends = int(any(p.any() or b.any() for p, b in zip(passed, bent, strict=True)))
     steps = place_of(of, axes)
     on, own = np.zeros((N, R, width)), np.zeros((N, width))
     for lane, one in enumerate(windows):
@@ -135,6 +143,11 @@ def group_of(
         length=stack([legs.length[at] for at in leg], 1.0),
         line=stack([(legs.radius[at] == 0.0) & ~now for at, now in zip(leg, passed, strict=True)]),
         bent=stack(bent),
+        passed=stack(passed),
+        target=vectors([one.limits.target for one in windows]),
+        way=vectors([way[at] for at in leg]),
+        rate=stack([rate[at] for at in leg]) if bends else np.zeros((0, width)),
+        shape=stack([shape[at] for at in leg]) if bends else np.zeros((0, 6, width)),
         begins=stack([np.diff(at, prepend=-1) != 0 for at in leg]),
         ends=stack([np.diff(at, append=-1) != 0 for at in leg]),
         at_vertex=limit("at_vertex"),
@@ -163,10 +176,10 @@ def group_of(
         aside=stack([np.array([one.limits.aside]) for one in windows], 0.0, 1),
     )
     first, normal = windows[0].limits, bool(own.any())
-    bends = Bends(leg[0], bent[0], passed[0], first.target, legs, first.laws, steps) if width == 1 else None
+    held = Held(first.laws, steps) if width == 1 else None
     laws = len(first.laws.kind) > 0
     which = (
-        bool(passed[0].any() or bent[0].any()),
+        bends,
         normal or laws,
         normal or bool(on[:, 8 * axes + NORMAL_NODE].any()),
         laws,
@@ -179,7 +192,7 @@ def group_of(
         x[count + 1 :, :axes, lane] = x[count, :axes, lane]
         u[:count, steps[3 * of :] - 3 * axes, lane] = one.u
     sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R, *which)
-    return sizes, group, bends, x, u, stack([one.place for one in windows])
+    return sizes, group, held, x, u, stack([one.place for one in windows])
 
 
 def _legs_of(windows: list[StepWindow]) -> tuple[LegFormulas, list[Array]]:
@@ -192,6 +205,17 @@ def _legs_of(windows: list[StepWindow]) -> tuple[LegFormulas, list[Array]]:
     offset = np.repeat(curves[:-1], np.diff(first))
     legs = legs._replace(curve=np.where(legs.curve >= 0, legs.curve + offset, -1))
     return legs, [one.limits.leg + begin for one, begin in zip(windows, first[:-1], strict=True)]
+
+
+def _formulas_of(legs: LegFormulas) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`way`, `rate` and `shape` of legs (R, ..)."""
+    arms = legs.radius[:, None] * legs.e1, legs.radius[:, None] * legs.e2
+    way, rate, shape = np.stack([legs.drift, *arms], axis=1), legs.rate.copy(), np.zeros((len(legs.rate), 6))
+    curved = np.flatnonzero(legs.curve >= 0)
+    points, weight = legs.points[legs.curve[curved]], legs.weight[legs.curve[curved]]
+    way[curved], rate[curved] = points[:, 1:] - points[:, :1], 0.0
+    shape[curved] = np.column_stack([weight, ordinates(points, weight, legs.length[curved])])
+    return way, rate, shape
 
 
 def place_of(of: int, axes: int) -> Array:

@@ -156,7 +156,7 @@ def _go(sizes, x, u, factor, along):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
-def solve_group(sizes, numbers, bends, motion, tuning, work, found):
+def solve_group(sizes, numbers, held, motion, tuning, work, found):
     """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 6, W),
     which is overwritten; tuning (7, W). What each comes to is set in `found`."""
     width, group = sizes.width, lanes_of(sizes, numbers)
@@ -181,14 +181,14 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
         wide2(work.du, width, sizes.control),
     )
     gap = wide2(work.gap, width, sizes.state)
-    room, scratch = room_of(sizes, work, x), scratch_of(sizes, bends)
+    room, scratch = room_of(sizes, work, x), scratch_of(sizes, held)
     zero = 0.0 * tune.pull
     lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
     for k in range(S):
         lambda_end[k] = zero
     looking = room.y, wide2(work.nearest, width, THREE), wide1(work.top, width)
     count = put_present(sizes, group, rows)
-    put_rows(sizes, group, bends, x, u, rows, zero, zero, looking, scratch)
+    put_rows(sizes, group, held, x, u, rows, zero, zero, looking, scratch)
     gap_most, off = gaps(sizes, group, x, u, gap)
     time = _durations(sizes, group, u, zero)
     products, broken = _start(sizes, rows, count, time, tune)
@@ -225,13 +225,13 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
         if not anywhere(active > 0.0):
             break
         bad = factor_steps(
-            sizes, group, bends, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
+            sizes, group, held, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
         )
         stiff = where(bad > 0.0, where(rho > END, active, zero), zero)
         if anywhere(stiff > 0.0):  # more digits than there are
             rho = where(stiff > 0.0, END + zero, rho)
             bad = factor_steps(
-                sizes, group, bends, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
+                sizes, group, held, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
             )
         if anywhere(active * bad > 0.0):
             for lane in range(len(sizes.width)):
@@ -262,4 +262,4 @@ def solve_group(sizes, numbers, bends, motion, tuning, work, found):
             gap_most, off = gaps(sizes, group, x, u, gap)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]
-        products, broken, owed = put_rows(sizes, group, bends, x, u, rows, along, dual, looking, scratch)
+        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)

@@ -1,5 +1,4 @@
-"""The legs of a run (run.py) as kernels see them: points, tangents, nearest places, and how far a control
-point is from a tangent."""
+"""The legs of a run (run.py) as kernels see them: points, tangents, and nearest places."""
 
 from typing import NamedTuple
 
@@ -166,43 +165,3 @@ def along_tangent(length, c, x, ahead, point, tangent):
         square += tangent[k] * tangent[k]
     far = miss / square
     return min(max(far, 0.0), length - x) if ahead else max(min(far, 0.0), -x)
-
-
-class Foot(NamedTuple):
-    """Where the tangent touches an arc to which an inner control point belongs: at the place x of a node,
-    behind the point or ahead of it. A place that is `fixed` does not move with the node."""
-
-    x: float
-    fixed: bool
-    behind: bool
-
-
-class Slopes(NamedTuple):
-    """Derivatives of a row."""
-
-    n: FloatArray  # (A,) by the control point
-    node: FloatArray  # (A,) by the node
-    tangent: FloatArray  # (A,) of the leg where the control point belongs to
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def off_tangent(legs, r, c, node, foot, room, slopes):
-    """The row of an inner control point c (A,) on an arc, (d2/room2 - 1)/2 with its distance d from the
-    tangent at a foot, and the place on the leg; its derivatives into `slopes`."""
-    axes, x = len(c), foot.x
-    point, bend, tangent = np.empty(axes), np.empty(axes), slopes.tangent
-    formula_point(legs, r, x, point, tangent, bend)
-    far = along_tangent(legs.length[r], c, x, foot.behind, point, tangent)
-    square, slope, long, turned = 0.0, 0.0, 0.0, 0.0
-    inside = far > 0.0 and x + far < legs.length[r] if foot.behind else far < 0.0 and x + far > 0.0
-    for k in range(axes):
-        off = c[k] - point[k] - far * tangent[k]
-        square += off * off
-        slope += off * (far * bend[k] + (0.0 if inside else tangent[k]))
-        long += tangent[k] * tangent[k]
-        turned += (node[k] - point[k]) * bend[k]
-        slopes.n[k] = off / (room * room)
-    by_node = 0.0 if foot.fixed else -slope / ((long - turned) * room * room)
-    for k in range(axes):
-        slopes.node[k] = by_node * tangent[k]
-    return 0.5 * (square / (room * room) - 1.0), x + far

@@ -27,7 +27,7 @@ class Work(NamedTuple):
     moves: FloatArray
     per_radius: FloatArray
     n: FloatArray
-    node: FloatArray
+    by_node: FloatArray
     tangent: FloatArray
     own: FloatArray
     between: FloatArray
@@ -42,16 +42,17 @@ class Work(NamedTuple):
     top: FloatArray
 
 
-def work_of(sizes: Sizes) -> Work:
-    """Memory of a group, all 0."""
+def work_of(sizes: Sizes, group: Group) -> Work:
+    """Memory of a group, all 0; of lines the tangents stay."""
     N, R, W = sizes.steps, sizes.rows, len(sizes.width)
     A, S, C = len(sizes.axes), len(sizes.state), len(sizes.control)
-    bent, own = N if sizes.any_bent else 0, N if sizes.any_own else 0
+    bent, own = N * sizes.bends, N if sizes.any_own else 0
     P = 3 * SETS
-    shapes = [(N, R)] * 7 + [(N, P), (N, 3), (N, P, A), (bent, P, A), (bent, P, A)]
+    shapes = [(N, R)] * 7 + [(N, P), (N, 3), (N, P, A), (bent, P), (0,)]
     shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (2,), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
     shapes += [(N, S), (R,), (N, 3), (N,)]
-    return Work(*(np.zeros((*shape, W)) for shape in shapes))
+    work = Work(*(np.zeros((*shape, W)) for shape in shapes))
+    return work._replace(tangent=np.repeat(group.drift, P, axis=0) if bent else group.drift)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -69,6 +70,11 @@ def lanes_of(sizes, group):
         wide1(group.length, width),
         wide1(group.line, width),
         wide1(group.bent, width),
+        wide1(group.passed, width),
+        wide3(group.target, width, THREE, sizes.axes),
+        wide3(group.way, width, THREE, sizes.axes),
+        wide1(group.rate, width),
+        wide2(group.shape, width, PLACES),
         wide1(group.begins, width),
         wide1(group.ends, width),
         wide1(group.at_vertex, width),
@@ -114,8 +120,8 @@ def rows_in(sizes, work, place):
         wide2(work.moves, w, PLACES),
         wide2(work.per_radius, w, THREE),
         wide3(work.n, w, PLACES, axes),
-        wide3(work.node, w, PLACES, axes),
-        wide3(work.tangent, w, PLACES, axes),
+        wide2(work.by_node, w, PLACES),
+        wide2(work.tangent, w, axes),
         wide3(work.own, w, own, sizes.step),
         wide1(work.between, w),
     )
@@ -141,19 +147,14 @@ def room_of(sizes, work, x):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def scratch_of(sizes, bends):
+def scratch_of(sizes, held):
     """Memory for what is worked out on single numbers; None where there is nothing."""
-    if bends is None:
+    if held is None:
         return None
-    L, of = sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS, len(bends.at) // 4
+    L, of = sizes.rows - 8 * len(sizes.axes) - NORMAL_ROWS, len(held.at) // 4
     return Scratch(
         np.zeros(3 * of),
         np.zeros(of + 1),
-        np.zeros((3, of)),
-        np.zeros(of),
-        np.zeros(of),
-        np.zeros(of),
-        np.zeros(of),
         np.zeros(L),
         np.zeros((L, 4 * of + 1)),
         np.zeros((4 * of + 1, 4 * of + 1)),

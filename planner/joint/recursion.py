@@ -178,7 +178,7 @@ def _backward_step(sizes, group, i, x, u, rows, pull, first, aim, second, end, f
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def factor_steps(sizes, group, bends, x, u, gap, rows, pull, prox, rho, end, factor, room, scratch):
+def factor_steps(sizes, group, held, x, u, gap, rows, pull, prox, rho, end, factor, room, scratch):
     """The recursion into `factor`, and the controls of the first step, towards s z = 0, as `backward`: pull, the weight of
     (h - its guess)^2, prox, that of dh^2 beside, and rho of the last node. Where it breaks down what is returned is not
     0."""
@@ -201,8 +201,8 @@ def factor_steps(sizes, group, bends, x, u, gap, rows, pull, prox, rho, end, fac
         put_model(sizes, group, rows, i, x[i], u[i], W, room.row)
         if sizes.any_normal:
             add_normal(sizes, group, rows, i, x, u, W)
-        if bends is not None and sizes.any_laws:
-            add_laws(sizes, group, bends, rows, i, x, u, W, scratch)
+        if held is not None and sizes.any_laws:
+            add_laws(sizes, group, held, rows, i, x, u, W, scratch)
         W[S + axes, S + axes] += 2.0 * (pull + prox) * group.per_h[i] * group.per_h[i]
         for k in range(axes):
             W[S + k, S + k] += group.smooth[i] * group.per_box[0, k] * group.per_box[0, k]

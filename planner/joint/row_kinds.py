@@ -80,8 +80,8 @@ class Rows(NamedTuple):
     moves: FloatArray  # (N, 6) 1 where these move with the point
     per_radius: FloatArray  # (N, 3) 1/r^2 of the rows of the feed
     n: FloatArray  # (N, 6, A) derivatives of the rows of the tolerance by y
-    node: FloatArray  # (N or 0, 6, A) on arcs by the second vectors
-    tangent: FloatArray  # (N or 0, 6, A) of the leg, on arcs
+    by_node: FloatArray  # (N or 0, 6) on arcs and curves by the second vectors: so many times the tangent
+    tangent: FloatArray  # (N or 6 N, A) of the leg, one for each place where any leg bends
     own: FloatArray  # (N or 0, .., 4 A + 1) derivatives of the rows from `NORMAL_ROWS` on
     between: FloatArray  # (2,) for the rows of the normal acceleration of a step
 
@@ -91,11 +91,6 @@ class Scratch(NamedTuple):
 
     x: FloatArray  # (S,)
     u: FloatArray  # (C,)
-    y: FloatArray  # (3, A)
-    point: FloatArray  # (A,)
-    n: FloatArray  # (A,)
-    node: FloatArray  # (A,)
-    tangent: FloatArray  # (A,)
     g: FloatArray  # (L,)
     slope: FloatArray  # (L, 4 A + 1)
     W: FloatArray  # (4 A + 1, 4 A + 1)

@@ -35,15 +35,15 @@ The tolerance is g = (d2/room2 - 1)/2 with the distance d to the nearest point o
 vertex), along which n = (y - nearest)/room2 holds whether or not the nearest point moves. On a line that is
 convex, and a motion may go back along it: its points belong to places in order (`put_places`), which are not
 the nearest ones where it does, and are taken as fixed. On an arc the inner control points belong to the
-tangents at the places of the step's nodes (run.py), which move with them: those rows depend on a second
-vector, p or the next node's, through `Rows.node`. On an arc that is passed (run.py) places are fixed.
+tangents at the places of the step's nodes (bends.py), which move with them: those rows depend on a second
+vector, p or the next node's, through `Rows.by_node`. On an arc that is passed (run.py) places are fixed.
 
 Other limits (laws.py) have rows of another kind, with their derivatives by p, v, a, j and h, behind all
 others where a window needs them.
 
 Where legs of different feeds meet at a vertex V the node may not be on the slower one's side of the place
 that is nearest to V: with m = 1 where the feed falls, -1 where it rises, m (p - V).v <= 0. This row depends
-on p and, through `Rows.node`, on v; its own curvature is left out, as that of the kinematics is. Where a motion
+on p and on v; its own curvature is left out, as that of the kinematics is. Where a motion
 comes nearer to V once more on the other side, nodes there have the row too, about a place further on (switches.py).
 Round V, at one distance, v is across p - V everywhere: so where that is not enough those nodes may not be beyond the
 plane through V either that is across the direction t of the start, m (p - V).t <= 0.
@@ -51,6 +51,7 @@ plane through V either that is across the direction t of the start, m (p - V).t 
 
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import anywhere, larger, magnitude, where
+from planner.joint.bends import put_bent, tangent_at
 from planner.joint.normal_rows import put_normal_rows
 from planner.joint.places import put_places, rest_of
 from planner.joint.row_kinds import (
@@ -84,7 +85,7 @@ from planner.joint.row_kinds import (
     P,
     V,
 )
-from planner.joint.single_rows import put_bent, put_laws, put_passed
+from planner.joint.single_rows import put_laws
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
@@ -148,20 +149,18 @@ def _put_radii(axes, x, u, square, per_radius):
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def bent_at(sizes, group, i):
-    """Whether the window has a leg that is no line, or is passed, at step i; none in lanes has (window_solver.py)."""
-    return len(sizes.width) == 1 and sizes.any_bent and anywhere(group.line[i] < group.real[i])
+    """Whether any window has a leg that is no line, or is passed, at step i."""
+    return sizes.bends > 0 and anywhere(group.line[i] < group.real[i])
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
-def tangent_of(sizes, group, rows, i, c, k):
-    """Of the leg at the node (c = 0) or an inner control point."""
-    if len(sizes.width) == 1 and sizes.any_bent:
-        return where(group.line[i] > 0.0, group.drift[i, k], rows.tangent[i, c, k])
-    return group.drift[i, k]
+def tangent_of(sizes, rows, i, c, k):
+    """Of the leg at a node or an inner control point, c as of `Rows.place`."""
+    return rows.tangent[tangent_at(sizes, i, c), k]
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
+def put_rows(sizes, group, held, x, u, rows, along, dual, room, scratch):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `rows`, whose places are where the search
     on arcs begins, and slacks and multipliers after the shares `along` and `dual` of their steps. Returns the sum of s z,
     the largest row, and the sum of z |g + s|: in units of time, what rows are off their slacks. A row that is not there is -1.
@@ -191,24 +190,19 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
             square, place = 0.0 * h, rows.place[i, c]
             for k in range(axes):
                 point = group.base[i, k] + place * group.drift[i, k]
+                if bent:
+                    point = where(group.passed[i] > 0.0, group.target[i, c % 3, k], point)
                 if of_node:
                     point = where(group.at_vertex[i] > 0.0, group.start[i, k], point)
                 off = y[vector, k] - point
                 square += off * off
-                if bent:
-                    rows.n[i, c, k] = where(group.line[i] > 0.0, off * per, rows.n[i, c, k])
-                else:
-                    rows.n[i, c, k] = off * per
+                rows.n[i, c, k] = off * per
             g[more + TUBE_NODE + c] = 0.5 * (square * per - 1.0)
-        if bends is not None and bent:
-            if bends.passed[i]:
-                put_passed(axes, bends, i, group, y, rows)
-            elif bends.bent[i]:
-                put_bent(axes, bends, i, group, y, rows, scratch)
+        if bent:
+            put_bent(sizes, group, i, y, rows)
             order_node, order_mid, arc = 0.0 * h, 0.0 * h, 0.0 * h
             for k in range(axes):
-                at_node = tangent_of(sizes, group, rows, i, 0, k)
-                at_mid = tangent_of(sizes, group, rows, i, 1, k)
+                at_node, at_mid = tangent_of(sizes, rows, i, 0, k), tangent_of(sizes, rows, i, 1, k)
                 order_node, order_mid = order_node - at_node * y[V, k], order_mid - at_mid * y[MID, k]
                 arc += at_mid * y[LONG, k]
             g[more + ORDER_NODE], g[more + ORDER_MID] = order_node / group.pace[i], order_mid / group.pace[i]
@@ -227,8 +221,8 @@ def put_rows(sizes, group, bends, x, u, rows, along, dual, room, scratch):
                 sizes, group.normal[i], group.pace[i], group.turns[i], x[i], u[i], rows.between, rows.own[i]
             )
             g[more + NORMAL_ROWS], g[more + NORMAL_ROWS + 1] = rows.between[0], rows.between[1]
-        if bends is not None and sizes.any_laws:
-            put_laws(sizes, bends, i, group, x, u, rows, scratch)
+        if held is not None and sizes.any_laws:
+            put_laws(sizes, held, i, group, x, u, rows, scratch)
         for r in range(R):
             there = rows.per_s[i, r] > 0.0
             g_r = where(there, g[r], -1.0)

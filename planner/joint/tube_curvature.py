@@ -42,10 +42,10 @@ def tube_weights(sizes, group, rows, i, m, x, u, bent):
     n_1, n_2, t_1, t_2 = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h
     for k in range(axes):
         at_0, at_1 = (
-            tangent_of(sizes, group, rows, i, 3 * m, k),
-            tangent_of(sizes, group, rows, i, 3 * m + 1, k),
+            tangent_of(sizes, rows, i, 3 * m, k),
+            tangent_of(sizes, rows, i, 3 * m + 1, k),
         )
-        at_2 = tangent_of(sizes, group, rows, i, 3 * m + 2, k)
+        at_2 = tangent_of(sizes, rows, i, 3 * m + 2, k)
         long_0, long_1, long_2 = long_0 + at_0 * at_0, long_1 + at_1 * at_1, long_2 + at_2 * at_2
         w = x[axes + k] + sag * u[k]
         e_1, e_2 = THIRD * w, THIRD * (2.0 * w + h * x[2 * axes + k])
@@ -63,11 +63,11 @@ def tube_block(sizes, group, rows, i, m, weights, h, k, t):
     """The second derivatives of a set's rows by axes k and t of p, v, a and j: pp, vp, ap, jp, vv, av, jv, aa, ja, jj."""
     s, flat, slide, _, _ = weights
     sag, c = group.sag[m], 3 * m
-    at_k, at_t = tangent_of(sizes, group, rows, i, c, k), tangent_of(sizes, group, rows, i, c, t)
+    at_k, at_t = tangent_of(sizes, rows, i, c, k), tangent_of(sizes, rows, i, c, t)
     g_0 = s[0] * rows.n[i, c, k] * rows.n[i, c, t] - slide[0] * at_k * at_t
-    at_k, at_t = tangent_of(sizes, group, rows, i, c + 1, k), tangent_of(sizes, group, rows, i, c + 1, t)
+    at_k, at_t = tangent_of(sizes, rows, i, c + 1, k), tangent_of(sizes, rows, i, c + 1, t)
     g_1 = s[1] * rows.n[i, c + 1, k] * rows.n[i, c + 1, t] - slide[1] * at_k * at_t
-    at_k, at_t = tangent_of(sizes, group, rows, i, c + 2, k), tangent_of(sizes, group, rows, i, c + 2, t)
+    at_k, at_t = tangent_of(sizes, rows, i, c + 2, k), tangent_of(sizes, rows, i, c + 2, t)
     g_2 = s[2] * rows.n[i, c + 2, k] * rows.n[i, c + 2, t] - slide[2] * at_k * at_t
     if t == k:
         g_0, g_1, g_2 = g_0 + flat[0], g_1 + flat[1], g_2 + flat[2]
@@ -98,8 +98,8 @@ def tube_by_h(sizes, group, rows, i, m, weights, x, u, k):
     h, w, none = u[axes], x[axes + k] + sag * u[k], 0.0 * u[axes]
     e_1, e_2 = THIRD * w, THIRD * (2.0 * w + h * x[2 * axes + k])
     f_1 = s[1] * n_e[0] * rows.n[i, c + 1, k] + flat[1] * e_1
-    f_1 -= slide[1] * t_e[0] * tangent_of(sizes, group, rows, i, c + 1, k)
+    f_1 -= slide[1] * t_e[0] * tangent_of(sizes, rows, i, c + 1, k)
     f_2 = s[2] * n_e[1] * rows.n[i, c + 2, k] + flat[2] * e_2
-    f_2 -= slide[2] * t_e[1] * tangent_of(sizes, group, rows, i, c + 2, k)
+    f_2 -= slide[2] * t_e[1] * tangent_of(sizes, rows, i, c + 2, k)
     by = of_state(sag, f_1 + f_2, THIRD * h * (f_1 + 2.0 * f_2), SIXTH * h * h * f_2, none)
     return by, e_1 * f_1 + e_2 * f_2

@@ -28,19 +28,18 @@ class Solved(NamedTuple):
 
 
 def kind_of(asked: Asked) -> Hashable | None:
-    """What windows have in common that are solved side by side: their axes, and the iterations they take about. None for one
-    with rows of arcs, curves and laws, which would be worked out lane by lane: the kernel with lanes has none of them. For
-    more axes there is none."""
+    """What windows have in common that are solved side by side: their axes, whether there are arcs or curves, and the
+    iterations they take about. None for one with rows of laws, which would be worked out lane by lane: the kernel with lanes
+    has none of them. For more axes there is none."""
     window = asked.window
-    bent = bool(window.limits.passed.any() or window.legs.radius.any())
-    axes = window.u.shape[1] - 1
-    return None if bent or len(window.which) or axes > AXES[0] else (axes, asked.tuning.gap)
+    axes, bends = window.u.shape[1] - 1, bool(window.legs.radius.any())
+    return None if len(window.which) or axes > AXES[0] else (axes, bends, asked.tuning.gap)
 
 
 def solve_windows(asked: Sequence[Asked], width: int) -> list[Solved]:
     """Solve `width` windows of one kind at most: in lanes, or one on single numbers, which rounds in another order. What is
     found in one of them does not depend on the others."""
-    sizes, group, bends, *motion = group_of([one.window for one in asked], width)
+    sizes, group, held, *motion = group_of([one.window for one in asked], width)
     tuning = np.ones((len(Tuning._fields), width))
     tuning[:, : len(asked)] = np.array([one.tuning for one in asked]).T
     x, u, place = motion
@@ -52,7 +51,7 @@ def solve_windows(asked: Sequence[Asked], width: int) -> list[Solved]:
         np.zeros(width, np.bool_),
         np.zeros(width, np.int64),
     )
-    solve_group(sizes, group, bends, tuple(motion), tuning, work_of(sizes), found)
+    solve_group(sizes, group, held, tuple(motion), tuning, work_of(sizes, group), found)
     return [_solved(one.window, lane, found) for lane, one in enumerate(asked)]
 
 

@@ -10,7 +10,7 @@ from planner.base.kernels import CONTRACT, njit
 from planner.base.views import size, vector, wide1, wide2, wide3
 from planner.joint.curvature import put_model
 from planner.joint.forces import put_slopes
-from planner.joint.group import Bends, Group, Sizes, group_of, rows_of
+from planner.joint.group import Group, Held, Sizes, group_of, rows_of
 from planner.joint.interior_point import put_present
 from planner.joint.memory import Work, lanes_of, room_of, rows_in, scratch_of, work_of
 from planner.joint.normal_rows import add_normal_curvature, put_normal_rows
@@ -25,7 +25,7 @@ class Alone(NamedTuple):
 
     sizes: Sizes
     group: Group
-    bends: Bends | None
+    held: Held | None
     x: Any
     u: Any
     place: Any
@@ -33,24 +33,24 @@ class Alone(NamedTuple):
 
     @classmethod
     def of(cls, window: Any) -> Alone:
-        sizes, group, bends, x, u, place = group_of([window], 1)
-        return cls(sizes, group, bends, x, u, place, work_of(sizes))
+        sizes, group, held, x, u, place = group_of([window], 1)
+        return cls(sizes, group, held, x, u, place, work_of(sizes, group))
 
 
 LOOK, SLOPES, MODELS, NEWTON, GAPS = range(5)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _piece(what, sizes, numbers, bends, x, u, place, work, change, out, settings, end):
+def _piece(what, sizes, numbers, held, x, u, place, work, change, out, settings, end):
     """One of these, into `work` or `out`."""
     group, w, N = lanes_of(sizes, numbers), sizes.width, sizes.steps
     at, control = wide2(x, w, sizes.state), wide2(u, w, sizes.control)
     rows, room = rows_in(sizes, work, wide2(place, w, _PLACES)), room_of(sizes, work, at)
-    gap, scratch = wide2(work.gap, w, sizes.state), scratch_of(sizes, bends)
+    gap, scratch = wide2(work.gap, w, sizes.state), scratch_of(sizes, held)
     if what == LOOK:
         looking = room.y, wide2(work.nearest, w, _THREE), wide1(work.top, w)
         put_present(sizes, group, rows)
-        put_rows(sizes, group, bends, at, control, rows, 0.0, 0.0, looking, scratch)
+        put_rows(sizes, group, held, at, control, rows, 0.0, 0.0, looking, scratch)
     elif what == GAPS:
         gaps(sizes, group, at, control, gap)
     elif what == NEWTON:
@@ -64,7 +64,7 @@ def _piece(what, sizes, numbers, bends, x, u, place, work, change, out, settings
         step, (pull, rho, aim) = vector(at, sizes.state), settings
         last = wide1(end, w)
         bad = factor_steps(
-            sizes, group, bends, at, control, gap, rows, pull, 0.0, rho, last, factor, room, scratch
+            sizes, group, held, at, control, gap, rows, pull, 0.0, rho, last, factor, room, scratch
         )
         backward(sizes, group, at, control, rows, pull, aim, 0.0, last, factor, room)
         forward(sizes, group, at, control, gap, rows, False, aim, 0.0, factor, room, step)
@@ -122,7 +122,9 @@ def gaps_of(alone: Alone, u: Any) -> Any:
 
 def sizes_of(axes: int) -> Sizes:
     """Of one step without rows."""
-    return Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(1), 1, 0, *[False] * 5)
+    return Sizes(
+        size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(1), 1, 0, 0, *[False] * 4
+    )
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)

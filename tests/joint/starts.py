@@ -57,6 +57,8 @@ MACHINES = {
 PROGRAMS = {
     "corner": problems.polyline([[0, 0], [4, 0], [4, 4]]),
     "arcs": parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X8 Y4 I0 J4\nG2 X12 Y8 Z1 I4 J0\nM2\n"),
+    "curves": parse_program("G21 G17 G90 F6000\nG1 X4\nG5 X12 Y0 I3 J3 P-3 Q5\nG1 X16\nM2\n"),
+    "narrow": parse_program("G21 G17 G90 F6000\nG1 X4\nG3 X4.08 Y0.08 J0.08\nG1 Y4\nG2 X9 Y9 I5\nM2\n"),
     "pentagon": problems.pentagon(side=6.0),
     "turned": read_program(text="G21 G90 F2400\nG1 X4 A3\nG1 X7 Y5 A8\nM2\n", machine=MACHINES["turned"]),
     "own": problems.polyline([[0, 0], [4, 0], [4, 4]]),

@@ -32,7 +32,7 @@ MISSED = own.MISSED
 # --- its pieces ----------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["corner", "arcs", "pushed", "turned", "own", "powered"])
+@pytest.mark.parametrize("name", ["corner", "arcs", "curves", "narrow", "pushed", "turned", "own", "powered"])
 def test_slopes_are_the_differences_of_the_rows(name):
     """Of all rows whose vector is what moves; the radii of the feed are kept, and so are the tangents of order and arcs."""
     run, guess = begun(name)
@@ -62,7 +62,7 @@ def test_slopes_are_the_differences_of_the_rows(name):
     np.testing.assert_allclose(slope[exact], ((after - before) / 2)[exact], rtol=2e-3, atol=2e-9)
 
 
-@pytest.mark.parametrize("name", ["corner", "arcs", "pushed", "turned"])
+@pytest.mark.parametrize("name", ["corner", "arcs", "curves", "narrow", "pushed", "turned"])
 def test_the_model_is_that_of_all_slopes_and_of_what_is_flat(name):
     """Of rows that all but touch, z/s grad g grad g', by the slopes in a random step; of rows far from that, z d2g of the rows at
     nodes, by the change of their slopes along a step of the node alone."""

@@ -178,7 +178,8 @@ def test_names_that_are_packages_too_stay_what_they_are() -> None:
         "import planner.verifier.judge, planner.feedrate.sampling.samples, planner.planning.methods.registry, planner, inspect\n"
         "assert callable(planner.verify) and callable(planner.path) and 'stop' in planner.methods\n"
         "assert planner.verifier.judge.verify is planner.verifier.verify is not planner.verify\n"
-        "assert list(inspect.signature(planner.path).parameters) == ['points', 'feed', 'axes', 'tolerance', 'spline']\n"
+        "assert list(inspect.signature(planner.path).parameters) == ['points', 'feed', 'axes', 'tolerance', 'spline', "
+        "'start_speed', 'end_speed']\n"
         "assert planner.__version__ and set(planner.__all__) <= set(dir(planner))\n"
         "for name in planner.__all__: getattr(planner, name)\n"
     )

@@ -52,7 +52,7 @@ SETTLING = 1.5  # up to where samples go, of the time in which a line gets to it
 LASTING = 0.8  # lines that are sampled take so long from an end to the middle, of that time [-]
 ROOM = 0.1  # by which the start of the programme takes longer [-]
 ENOUGH, ITERATIONS = 2e-5, 40  # gap at which a programme ends [-], and after how many iterations at last
-NEAR = 1e-3  # the same of speeds at corners [-]
+NEAR = 1e-4  # the same of speeds at corners [-]
 # lines that are sampled, those that take longest for their tolerance; 5,000 take five times as long, for 0.1 % at most
 MOST = 1000
 

@@ -22,7 +22,7 @@ from planner.planning.job.plan import Plan
 from planner.sensitivity.corner_speeds import confined, legs_between
 from planner.sensitivity.least_time import least_time
 from planner.sensitivity.straight_time import Bounds, End, straight_time
-from planner.sensitivity.turning_back import extremes
+from planner.sensitivity.turning_back import _spans, extremes
 from planner.sensitivity.waypoints import Way, way_of
 
 MILL = load_machine("mill")
@@ -240,6 +240,28 @@ def test_extremes_stand_out(seed: int) -> None:
     for begin, end in itertools.pairwise(at[1:-1]):  # nothing between them is beyond them
         inside = place[begin : end + 1]
         assert {float(inside.min()), float(inside.max())} == {float(place[begin]), float(place[end])}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_parts_that_turn_back_end_where_extremes_stand_out(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    place, within = np.cumsum(rng.normal(size=(2, 200)), axis=1), rng.uniform(0.5, 1.0, 200)
+    feed, width = rng.uniform(1.0, 9.0, 199), 2.0 * within.max()
+    rows, least, most = _spans(place, within, feed)
+    for d, along in enumerate(place):
+        at, mine = extremes(along, width), rows[:, 0] == d
+        ends = list(zip(*rows[mine, 1:].T.tolist(), strict=True))
+        assert len(ends) == len(at) > 2
+        assert (ends[0][1], ends[-1][1]) == (0, 0)
+        for n in range(1, len(at) - 1):
+            apart = np.flatnonzero(np.abs(along - along[at[n]]) > width)
+            before, behind = apart[(apart >= at[n - 1]) & (apart < at[n])], apart[apart > at[n]]
+            assert ends[n] == (before.max() if len(before) else at[n - 1], len(before) > 0, behind.min())
+        for n, (one, other) in enumerate(itertools.pairwise(ends)):
+            begin, end = at[n : n + 2]
+            apart = abs(along[end] - along[begin]) - within[begin] - within[end]
+            assert least[mine][n] == pytest.approx(max(apart, 0.0))
+            assert most[mine][n] == feed[one[0] if one[1] else 0 : other[2]].max()
 
 
 def test_where_it_is_not_known() -> None:

@@ -10,7 +10,8 @@ What was tried to make them cheaper and brought nothing, so that it is not tried
     first motion   on a coarser grid: cheaper on long programs of short blocks, dearer on random ones, some motions slower
     the verdict    fewer looks between setpoints where the acceleration is small: distances from vertices are those of
                    chords between looks, right motions were refused; the worst of each quantity found by a kernel of its
-                   own: numpy's division and argmax are as fast; motions of long runs evaluated together: what they take
-                   is arithmetic, not calls (of short runs it is calls: planner/joint/splice.py)
+                   own: numpy's division and argmax are as fast (but not as one pass for all of them: planner/verifier/limits.py);
+                   motions of long runs evaluated together: what they take is arithmetic, not calls (of short runs it is
+                   calls: planner/joint/splice.py)
     kernels        in numba's own cache, in three ways: results/first-run.md
 """

@@ -243,7 +243,8 @@ def sample(table, law, grid, inverse, times, axes):
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
     m = last_not_after(t, times[0], 0, len(t) - 1) if count else 0
     i, at, joint = -1, 0, 0
-    on = interval_of(grid, at)
+    # known: the derivatives, which a straight leg has once
+    on, known = interval_of(grid, at), False
     for n in range(count):
         while m + 1 < len(t) and t[m + 1] <= times[n]:
             m += 1
@@ -263,10 +264,16 @@ def sample(table, law, grid, inverse, times, axes):
         while i < last and s[i + 1] <= s_here:
             i += 1
         if i != at:
-            on, at = interval_of(grid, i), i
+            on, at, known = interval_of(grid, i), i, False
         ds = min(max(s_here - s[i], 0.0), on.h)
-        w = place_of(table, on, work, inverse[i], ds, here)
-        to_arc_length(here)
+        if known:
+            w = on.w0 + (on.w1 - on.w0) * (ds / on.h)
+            for k in range(axes):
+                here[0, k] = legs[on.element].start[k] + w * legs[on.element].direction[k]
+        else:
+            w = place_of(table, on, work, inverse[i], ds, here)
+            to_arc_length(here)
+            known = is_straight(legs, on.element)
         out_s[n], out_feed[n] = s[i] + ds, v
         segment[n] = of_interval[i]
         if element[i] >= len(legs):

@@ -141,6 +141,18 @@ def test_dense_motion_is_the_same_motion():
         assert np.abs(near - got.position[:, axis]).max() <= 2000 * gap**2 / 8 + 1e-9
 
 
+@pytest.mark.parametrize("job", ["pentagon", "arcs"])
+def test_a_motion_at_one_time_is_what_it_is_among_others(job):
+    """To the last bit, also on straight legs, whose derivatives are not computed again for each time."""
+    motion = solved_job(job).motion
+    times = np.sort(np.random.default_rng(5).uniform(0.0, motion.end, 300))
+    together = motion.at(times, MACHINE.dt)
+    for k in range(0, 300, 7):
+        alone = motion.at(times[k : k + 1], MACHINE.dt)
+        for name in ("position", "velocity", "acceleration", "jerk", "s", "feed"):
+            np.testing.assert_array_equal(getattr(alone, name)[0], getattr(together, name)[k])
+
+
 # --- dwells ---------------------------------------------------------------------------------------------------------------
 
 DWELLS = "G21 G90 G94 F6000\nG4 P0.5\nG1 X10\nG4 P0.25\nG4 P0.125\nX20\nG4 P0.1\nM2\n"

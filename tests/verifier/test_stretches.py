@@ -63,23 +63,26 @@ def shaken(trajectory, seed):
 
 def passed(trajectory, toolpath, at_once):
     """Where `Switches` finds the vertices passed, so many samples at a time."""
-    pieces, n = program_pieces(toolpath), len(trajectory)
-    switches = Switches(pieces, Bounds(np.full(3, 100.0), np.zeros(4), 3464.0))
+    n = len(trajectory)
     segment = np.searchsorted(joints(trajectory, toolpath), np.arange(n), "right") - 1
     piece = np.clip(segment, 0, len(toolpath) - 1)
     first, last = np.maximum(piece - 1, 0), np.minimum(piece + 1, len(toolpath) - 1)
     far = np.linalg.norm(trajectory.position - toolpath.end[piece], axis=1) > M.tolerance
     last = np.where(far, piece, last)
     first = np.where(np.linalg.norm(trajectory.position - toolpath.start[piece], axis=1) > 0.05, piece, first)
-    first, last = np.maximum.accumulate(first), np.maximum.accumulate(last)
-    state = trajectory.position[:, None].copy()
-    for low in range(0, n, at_once):
+    on = piece, np.maximum.accumulate(first), np.maximum.accumulate(last)
+    return switched(trajectory.t, trajectory.position, on, toolpath, at_once)
+
+
+def switched(t, position, on, toolpath, at_once):
+    """The same of places (n, A) at times t, with their piece, and the first and the last that each can be on."""
+    switches = Switches(program_pieces(toolpath), Bounds(np.full(3, 100.0), np.zeros(4), 3464.0))
+    for low in range(0, len(t), at_once):
         skip = min(low, 1)
         part = slice(low - skip, low + at_once)
-        t = trajectory.t[part]
-        none = np.zeros_like(t)
-        columns = piece[part], first[part], last[part], np.full(len(t), np.nan), state[part]
-        switches.take(Chords(t, none, none.copy(), none, *columns), skip)
+        none = np.zeros(len(t[part]))
+        columns = *(each[part] for each in on), np.full(len(none), np.nan), position[part, None].copy()
+        switches.take(Chords(t[part], none, none.copy(), none, *columns), skip)
     switches.finish()
     return switches.found.switch[["place", "begin", "end", "group"]].tolist()
 
@@ -99,6 +102,22 @@ def test_vertices_are_passed_at_the_same_places_however_many_samples_are_taken_t
         whole = passed(motion, toolpath, len(motion))
         assert whole == passed(motion, toolpath, 1)
         assert whole == passed(motion, toolpath, 7)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_chord_that_comes_nearer_than_its_ends_is_not_left_out(seed):
+    random = np.random.default_rng(seed)
+    toolpath = programmed(np.array([(0.0, 0.0, 0.0), (10.0, 0.0, 0.0), (10.0, 10.0, 0.0)]))
+    n, behind = 60, 8
+    away = random.normal(size=(n, 3))
+    away *= (np.linspace(1.0, 0.3, n) + random.uniform(0.0, 0.2, n) ** 2)[:, None] / np.linalg.norm(
+        away, axis=1, keepdims=True
+    )
+    on = (np.arange(n) >= n - behind).astype(np.int64)
+    motion = 1e-3 * np.arange(n), toolpath.end[0] + away, (on, on, on), toolpath
+    whole = switched(*motion, n)
+    assert whole == switched(*motion, 1)
+    assert whole == switched(*motion, 5)
 
 
 def seen(verdict):

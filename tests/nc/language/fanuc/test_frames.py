@@ -77,6 +77,10 @@ CASES = {
         "G0 X5. Y5.\nG13 I6. Z-1. D1\nG0 Z5.",
         "G0 X5 Y5\nG1 Z-1\nG3 X9 Y5 I2\nG3 X9 Y5 I-4\nG3 X5 Y5 I-2\nG0 Z5",
     ),
+    "a round pocket at its place": (
+        "G0 X1. Y1.\nG13 I6. X5. Y5. Z-1. D1\nG0 Z5.",
+        "G0 X1 Y1\nX5 Y5\nG1 Z-1\nG3 X9 Y5 I2\nG3 X9 Y5 I-4\nG3 X5 Y5 I-2\nG0 Z5",
+    ),
     "a round pocket by and by": (
         "G12 I4. K7. Q2. Z-1. D1 F300.\nG0 Z5.",
         "G1 Z-1 F300\nG2 X2 Y0 I1\nG2 X2 Y0 I-2\nG1 X4\nG2 X4 Y0 I-4\nG1 X5\nG2 X5 Y0 I-5\nG2 X0 Y0 I-2.5\nG0 Z5",
@@ -105,6 +109,7 @@ METRIC = (
     "P of cycles",
     "pecks that grow less",
     "a round pocket",
+    "a round pocket at its place",
     "a round pocket by and by",
     "compensation in a mirror",
 )

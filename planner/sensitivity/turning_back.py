@@ -14,7 +14,7 @@ def turns_of(run: Way) -> Events:
     axes = run.point.shape[1]
     signs = np.array(list(np.ndindex(*(3,) * axes)))[3**axes // 2 + 1 :] - 1.0  # one of each and its opposite
     direction = signs / np.linalg.norm(signs, axis=1)[:, None]
-    found, least, feed = _spans(np.ascontiguousarray(direction @ run.point.T), run.tolerance, run.feed)
+    found, least, feed = spans(np.ascontiguousarray(direction @ run.point.T), run.tolerance, run.feed)
     of, begin, stands_out, end = found.T
     first, last = np.diff(of, prepend=-1) != 0, np.diff(of, append=-1) != 0
     bounds, _ = run.along(direction[of], feed)
@@ -29,7 +29,7 @@ def turns_of(run: Way) -> Events:
 
 
 @njit(cache=True, error_model="numpy")
-def _spans(place, tolerance, feed):
+def spans(place, tolerance, feed):
     """Of all extremes of `place` (D, N+1) in D directions, of those with more than the two ends: (K, 4) the direction; the last
     waypoint before it from which it stands out, if it does, else the extreme before; whether it does; and the first one behind it,
     -1 for none. (K,) the way to the next one at least, and the largest feed meanwhile."""

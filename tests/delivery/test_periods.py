@@ -179,9 +179,9 @@ def test_stops_wait_less_than_a_period():
 
 @pytest.mark.slow
 def test_what_the_period_takes_is_said_and_the_programmed_path_is_what_is_judged():
-    made = plan(ARC_JOB, coarse(0.02, 5e-3), method="second-order")
+    made = plan(ARC_JOB, coarse(0.02, 2e-3), geometry="spline")
     assert any(note.startswith("samples 20 ms apart") for note in made.notes)
-    np.testing.assert_array_equal(made.toolpath.tolerance, 5e-3)
+    np.testing.assert_array_equal(made.toolpath.tolerance, 2e-3)
     assert (made.toolpath.joint[1:-1] != Joint.STOP).all()
 
 
@@ -190,7 +190,7 @@ def test_without_it_chords_leave_the_tolerance(monkeypatch):
     """What the law would say of a planner that forgot its period."""
     monkeypatch.setattr(less_tolerance, "PERIOD_ROUNDS", 0)
     monkeypatch.setattr(mending, "ROUNDS", 0)
-    assert not plan(ARC_JOB, coarse(0.02, 5e-3), method="second-order").verdict.passed
+    assert not plan(ARC_JOB, coarse(0.02, 2e-3), geometry="spline").verdict.passed
     nothing = periods.Standing(np.empty(0), np.empty(0))
     monkeypatch.setattr(periods, "standing", lambda *given: nothing)
     assert not plan(LAW_JOB, coarse(0.02, 5e-3), method="stop").verdict.passed

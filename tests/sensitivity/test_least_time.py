@@ -22,7 +22,7 @@ from planner.planning.job.plan import Plan
 from planner.sensitivity.corner_speeds import confined, legs_between
 from planner.sensitivity.least_time import least_time
 from planner.sensitivity.straight_time import Bounds, End, straight_time
-from planner.sensitivity.turning_back import _spans, extremes
+from planner.sensitivity.turning_back import extremes, spans
 from planner.sensitivity.waypoints import Way, way_of
 
 MILL = load_machine("mill")
@@ -247,7 +247,7 @@ def test_parts_that_turn_back_end_where_extremes_stand_out(seed: int) -> None:
     rng = np.random.default_rng(seed)
     place, within = np.cumsum(rng.normal(size=(2, 200)), axis=1), rng.uniform(0.5, 1.0, 200)
     feed, width = rng.uniform(1.0, 9.0, 199), 2.0 * within.max()
-    rows, least, most = _spans(place, within, feed)
+    rows, least, most = spans(place, within, feed)
     for d, along in enumerate(place):
         at, mine = extremes(along, width), rows[:, 0] == d
         ends = list(zip(*rows[mine, 1:].T.tolist(), strict=True))

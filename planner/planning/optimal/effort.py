@@ -83,7 +83,7 @@ _TINY, _FEW, _MANY = SIZES.small_grids
 _LARGE = Grids(float("inf"), COARSE, 8e-3)
 EFFORTS = {
     QUICK: Effort(
-        search=Search(steps_max=SMALL, finer=(), again=False),
+        search=Search(steps_max=STEPS_MAX, finer=(), again=False, small=SMALL),
         sizes=(_LARGE,),
     ),
     NORMAL: Effort(

@@ -19,6 +19,7 @@ from planner.commands.terminal import FAILED, guarded, say, say_json
 
 if TYPE_CHECKING:
     from planner.motion.pulses import AxisPulses
+    from planner.motion.trajectory import Trajectory
     from planner.planning.job.plan import Plan
 
 
@@ -116,6 +117,7 @@ def export_command(
     with _new_directory(output) as new:
         read = read_trajectory(trajectory_file(plan))
         trajectory = read.trajectory
+        _require_rest(trajectory, plan)
         if len(trajectory.extruder):
             raise InputError(_NO_EXTRUDER, source=str(plan))
         machine = read.metadata.get("machine")
@@ -191,12 +193,27 @@ def _saved(plan: Path) -> Plan:
     return saved_plan(plan)[0]
 
 
+# A file rests where it is slower than this share of its fastest [-]: digits of files, velocities from differences.
+AT_REST = 1e-3
+
+
+def _require_rest(trajectory: Trajectory, source: Path) -> None:
+    """Raises InputError for a motion that begins or ends in motion: what is written is run from rest to rest."""
+    if (trajectory.feed[[0, -1]] > AT_REST * trajectory.feed.max()).any():
+        text = (
+            "the motion begins or ends in motion, and controls and drives run files from rest to rest: "
+            "plan it without start_speed and end_speed"
+        )
+        raise InputError(text, source=str(source))
+
+
 def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> None:
     """Write the program of a plan's directory for a control, and say what it holds."""
     from planner.controls.export.program import NO_JERK, write_program
 
     with _new_directory(output) as new:
         saved = _saved(plan)
+        _require_rest(saved.trajectory, plan)
         allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
         made = write_program(new, saved, for_.value, allowed)
     _say_assumed(saved.program.assumptions)
@@ -243,6 +260,7 @@ def pulses_command(
     drive = Drive(frequency_max=max_frequency, width=None if pulse_width is None else pulse_width * 1e-6)
     trajectory = trajectory_file(trajectory)
     read = read_trajectory(trajectory)
+    _require_rest(read.trajectory, trajectory)
     trains = pulses_of(read.trajectory, wanted)
     faults = overrun(trains, drive)
     if output is not None and not faults:

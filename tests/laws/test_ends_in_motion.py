@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import planner
+from planner.commands.app import app
 
 MILL = planner.load_machine("mill")
 FEED = 100.0
@@ -41,6 +43,17 @@ def test_backwards_it_takes_as_long():
     assert there.verdict.passed
     assert back.verdict.passed
     assert back.cycle_time == pytest.approx(there.cycle_time, rel=2e-4)
+
+
+@pytest.mark.parametrize("ends", [{"start_speed": 40.0}, {"end_speed": 40.0}])
+@pytest.mark.parametrize("control", ["linuxcnc-stream", "pvt", "twincat", "linuxcnc"])
+def test_it_is_not_exported_to_what_starts_from_rest(ends, control, tmp_path):
+    planned(LEGS, **ends).save(tmp_path / "plan")
+    asked = ["export", str(tmp_path / "plan"), "--for", control, "-o", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, asked)
+    assert result.exit_code == 2
+    assert "begins or ends in motion" in result.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_to_begin_in_motion_takes_less_time_the_faster_it_is():

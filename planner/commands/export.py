@@ -197,9 +197,10 @@ def _saved(plan: Path) -> Plan:
 AT_REST = 1e-3
 
 
-def _require_rest(trajectory: Trajectory, source: Path) -> None:
-    """Raises InputError for a motion that begins or ends in motion: what is written is run from rest to rest."""
-    if (trajectory.feed[[0, -1]] > AT_REST * trajectory.feed.max()).any():
+def _require_rest(trajectory: Trajectory | None, source: Path) -> None:
+    """Raises InputError for a motion that begins or ends in motion (a plan without a motion passes): what is
+    written is run from rest to rest."""
+    if trajectory is not None and (trajectory.feed[[0, -1]] > AT_REST * trajectory.feed.max()).any():
         text = (
             "the motion begins or ends in motion, and controls and drives run files from rest to rest: "
             "plan it without start_speed and end_speed"

@@ -128,16 +128,10 @@ def suppressing(T1: FloatArray, T2: FloatArray, periods: tuple[float, ...]) -> t
 
     Raises ValueError for none or more than two periods.
     """
-    if len(periods) == 1:
-        one = (_multiple(T1, periods[0]), T2), (T1, _multiple(T2, periods[0]))
-    elif len(periods) == 2:
-        one = (
-            (_multiple(T1, periods[0]), _multiple(T2, periods[1])),
-            (_multiple(T1, periods[1]), _multiple(T2, periods[0])),
-        )
-    else:
+    if len(periods) not in (1, 2):
         raise ValueError(f"{len(periods)} periods; two filters suppress one or two modes")
-    (a1, a2), (b1, b2) = one
+    one, other = periods[0], periods[1] if len(periods) == 2 else None
+    a1, a2, b1, b2 = _multiple(T1, one), _multiple(T2, other), _multiple(T1, other), _multiple(T2, one)
     first = a1 + a2 <= b1 + b2
     x, y = np.where(first, a1, b1), np.where(first, a2, b2)
     return np.maximum(x, y), np.minimum(x, y)
@@ -148,6 +142,8 @@ def damped_period(frequency: float, damping: float) -> float:
     return 1.0 / (frequency * float(np.sqrt(1.0 - damping**2)))
 
 
-def _multiple(T: FloatArray, period: float) -> FloatArray:
-    """T (S,) [s] rounded up to whole periods, one at least."""
-    return np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
+def _multiple(T: FloatArray, period: float | None) -> FloatArray:
+    """T (S,) [s] rounded up to whole periods, one at least; as it is without a period."""
+    return (
+        T if period is None else np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
+    )

@@ -127,10 +127,7 @@ def _reaching(state, s, duration):
     low, high = 0.0, duration
     for _ in range(BISECTIONS):
         tau = 0.5 * (low + high)
-        if p + tau * (v + tau * (a / 2.0 + tau * j / 6.0)) < s:
-            low = tau
-        else:
-            high = tau
+        low, high = (tau, high) if p + tau * (v + tau * (a / 2.0 + tau * j / 6.0)) < s else (low, tau)
     return 0.5 * (low + high)
 
 

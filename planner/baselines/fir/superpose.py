@@ -73,22 +73,9 @@ def axes_of(
     t, state = motion.t, motion.state[:, :, :-1]
     if t[0] > 0:
         t, segment = np.insert(t, 0, 0.0), np.insert(segment, 0, first)
-        still = np.zeros((4, 1, len(start)))
-        still[0, 0] = start
-        state = np.concatenate([still, state], axis=1)
-    position, velocity, acceleration, jerk = state
-    return AxisMotion(
-        axes=toolpath.axes,
-        radius=toolpath.radius,
-        t=t,
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-        block=toolpath.block[segment],
-        line=toolpath.line[segment],
-        end=float(motion.ends[-1]),
-    )
+        state = np.insert(state, 0, 0.0, axis=1)
+        state[0, 0] = start
+    return AxisMotion.of(state, t, float(motion.ends[-1]), toolpath, segment)
 
 
 @njit(cache=True, error_model="numpy")

@@ -98,9 +98,8 @@ def _fastest(
         left = times[0] < times[1]
         low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
         new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
-        of_new = time(new)
-        inner = [np.where(left, new, inner[1]), np.where(left, inner[0], new)]
-        times = [np.where(left, of_new, times[1]), np.where(left, times[0], of_new)]
+        for two, there in ((inner, new), (times, time(new))):
+            two[:] = np.where(left, there, two[1]), np.where(left, two[0], there)
     speed = np.exp(np.where(times[0] < times[1], inner[0], inner[1]))
     return speed, product / speed
 

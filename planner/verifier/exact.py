@@ -92,8 +92,7 @@ def _positions(trajectory: Trajectory) -> Iterator[tuple[FloatArray, FloatArray]
     """Times and positions of the samples, some at a time."""
     for chunk in trajectory.chunks():
         for low in range(0, len(chunk), BLOCK_SAMPLES):
-            part = slice(low, low + BLOCK_SAMPLES)
-            yield chunk.t[part], chunk.position[part]
+            yield chunk.t[low : low + BLOCK_SAMPLES], chunk.position[low : low + BLOCK_SAMPLES]
 
 
 def _beside(toolpath: Toolpath) -> Array:
@@ -117,10 +116,8 @@ def _exact_pieces(toolpath: Toolpath, pieces: ProgramPieces) -> Array:
 
 
 def _tightened(pieces: ProgramPieces, exact: Array, bow: float) -> ProgramPieces:
-    """The pieces with the budgets of the module's text on `exact` (N,) ones, and at their end vertices.
-
-    bow : largest distance of a motion from its chord [mm]; inf or NaN where acceleration is not judged
-    """
+    """The pieces with the budgets of the module's text on `exact` (N,) ones, and at their end vertices; bow: largest
+    distance of a motion from its chord [mm], inf or NaN where acceleration is not judged."""
     piece, joint = pieces.piece.copy(), pieces.joint.copy()
     piece["budget"][exact] = PLACE_ROUNDING
     at_end = np.append(exact, False) | np.append(False, exact)

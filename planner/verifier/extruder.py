@@ -26,9 +26,9 @@ from planner.verifier.excess import Fault, Kind, first_of
 from planner.verifier.findings import check_of, joint_times
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import FEED_AT_REST, UNITS
+from planner.verifier.other_limits import along_path
 from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces
 from planner.verifier.stream import Observed, overlapping
-from planner.verifier.user_limits import along_path
 from planner.verifier.verdict import LimitCheck
 from planner.verifier.worst import (
     COLUMN,

@@ -44,7 +44,7 @@ from planner.verifier.pieces import (
     reach_chord,
     reach_piece,
 )
-from planner.verifier.stops import AtStop, longest_rest, watch_stop
+from planner.verifier.stops import longest_rest, watch_stop
 
 NEAR_MISS = 2.0  # errors up to this multiple of the budget are matched in place; beyond, a block is left out
 BISECTIONS = 12  # of the widened budget: 1/4096 of it
@@ -108,19 +108,9 @@ def nowhere(samples: int) -> Located:
 
 
 @kernel()
-def match_samples(
-    pieces: ProgramPieces,
-    match: Match,
-    t: FloatArray,
-    position: FloatArray,
-    skip: int,
-    parts: int,
-    velocity: FloatArray,
-    at_stop: AtStop,
-    place: Located,
-) -> None:
+def match_samples(pieces, match, t, position, skip, parts, velocity, at_stop, place):
     """Match samples `skip` to the last, in `match`, and write their places; those before belong to the
-    previous call. The first call has skip = 0.
+    previous call.
 
     t, position : (n,) [s], (n, A) [mm]
     parts       : into how many a period is divided: the places between are samples too
@@ -156,30 +146,22 @@ def match_samples(
                 before[axis] = point[axis]
         for i in range(began, match.tally[LAST] + 2):
             if k and pieces.joint[i]["stop"]:
-                match.passed[i]["rest"] += longest_rest(
-                    pieces, i, position[k - 1], position[k], period, at_stop
-                )
+                rest = longest_rest(pieces, i, position[k - 1], position[k], period, at_stop)
+                match.passed[i]["rest"] += rest
         place.first[k], place.last[k] = match.tally[FIRST], match.tally[LAST]
         if match.tally[ASTRAY]:
             place.last[k] = -2
 
 
 @kernel(inline=True)
-def _step(
-    pieces: ProgramPieces, match: Match, before: FloatArray, point: FloatArray, time: float
-) -> tuple[int, float]:
-    """Go on from `before` to `point`; return the piece it lies on and the largest feed of those it can lie
-    on.
-
-    Where nothing within the budget is possible, go on as the module's text says.
-    """
+def _step(pieces, match, before, point, time):
+    """Go on from `before` to `point`, where nothing within the budget is possible as the module's text says; return the
+    piece it lies on and the largest feed of those it can lie on."""
     little, enough = 1.0, NEAR_MISS  # the bisection of the widened budget
     widen, widen_vertex = 1.0, 1.0
     for attempt in range(BISECTIONS + 4):
-        late = attempt > 0
-        first, last, distance, i, feed, stuck = _column(
-            pieces, match, before, point, time, widen, widen_vertex, late
-        )
+        found = _column(pieces, match, before, point, time, widen, widen_vertex, attempt > 0)
+        first, last, distance, i, feed, stuck = found
         if attempt == 0 and first > last and match.tally[STUCK_AT] == NOT_LOST:
             match.tally[STUCK_AT] = stuck
         if attempt <= 1:  # 0: as it should be, 1: a vertex missed by little
@@ -209,24 +191,14 @@ def _step(
 
 
 @kernel(inline=True)
-def _column(
-    pieces: ProgramPieces,
-    match: Match,
-    before: FloatArray,
-    point: FloatArray,
-    time: float,
-    widen: float,
-    widen_vertex: float,
-    late: bool,
-) -> tuple[int, int, float, int, float, int]:
+def _column(pieces, match, before, point, time, widen, widen_vertex, late):
     """Which pieces `point` can lie on, into match.track.new. The one step of the sweep.
 
     widen, widen_vertex : factors on the budgets of samples and vertices
     late                : a vertex counts as passed if any earlier chord came near enough
 
-    -> first and last possible piece (first > last: none), distance from the nearest of them, that piece,
-    largest feed, and the vertex
-       that was not passed
+    -> first and last possible piece (first > last: none), distance from the nearest of them, that piece, largest feed,
+    and the vertex that was not passed
     """
     track, passed = match.track, match.passed
     i, last_before = match.tally[FIRST], match.tally[LAST]
@@ -263,14 +235,9 @@ def _column(
 
 
 @kernel()
-def _stray(
-    pieces: ProgramPieces, match: Match, before: FloatArray, point: FloatArray, time: float
-) -> tuple[float, int, float]:
+def _stray(pieces, match, before, point, time):
     """Far from where the program should be: take the first piece ahead that fits, or hold the place on the
-    path, lost.
-
-    -> distance [mm], inf if lost; piece, feed [mm/s]
-    """
+    path, lost. -> distance [mm], inf if lost; piece, feed [mm/s]"""
     track, passed, tally = match.track, match.passed, match.tally
     begin = tally[LAST] + 1
     for ahead in range(begin, min(begin + PIECES_AHEAD, len(track))):
@@ -304,7 +271,7 @@ def _stray(
 
 
 @kernel(inline=True)
-def _commit(match: Match, first: int, last: int) -> None:
+def _commit(match, first, last):
     """Make the possible pieces `first` to `last` of match.track.new the present ones."""
     match.tally[ASTRAY] = 0
     for i in range(match.tally[FIRST], match.tally[LAST] + 1):
@@ -315,5 +282,5 @@ def _commit(match: Match, first: int, last: int) -> None:
 
 
 @kernel(inline=True)
-def _allowed(budget: float) -> float:
+def _allowed(budget):
     return budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING

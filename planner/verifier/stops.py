@@ -17,8 +17,8 @@ samples fall.
 import math
 from typing import NamedTuple
 
-from planner.base.arrays import Array, FloatArray
-from planner.verifier.pieces import PLACE_ROUNDING, ProgramPieces, kernel, reach_chord
+from planner.base.arrays import FloatArray
+from planner.verifier.pieces import PLACE_ROUNDING, kernel, reach_chord
 
 STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding of coordinates up to 1e6 mm
 
@@ -33,16 +33,7 @@ class AtStop(NamedTuple):
 
 
 @kernel()
-def watch_stop(
-    pieces: ProgramPieces,
-    passed: Array,
-    i: int,
-    before: FloatArray,
-    point: FloatArray,
-    period: float,
-    parts: int,
-    at_stop: AtStop,
-) -> None:
+def watch_stop(pieces, passed, i, before, point, period, parts, at_stop):
     """The chord from `before` to `point` (A,), one of `parts` of a period [s], shows of the stop at vertex i,
     into `passed`."""
     acceleration_max, rounding = at_stop.acceleration_max, at_stop.rounding
@@ -62,9 +53,7 @@ def watch_stop(
 
 
 @kernel()
-def longest_rest(
-    pieces: ProgramPieces, i: int, before: FloatArray, point: FloatArray, period: float, at_stop: AtStop
-) -> float:
+def longest_rest(pieces, i, before, point, period, at_stop):
     """How long a motion with samples `before` and `point` (A,), a period [s] apart, can rest at vertex i
     between them [s]."""
     early, late = 0.0, 0.0

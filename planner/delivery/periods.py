@@ -61,11 +61,8 @@ class Standing(NamedTuple):
 def standing(
     motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool = False
 ) -> Standing:
-    """How much longer a motion has to stand where chords would cut off a full stop by too much.
-
-    jerk_limited : whether the motion is known to leave a full stop with limited jerk, not with full
-                   acceleration at once: then it need not be looked at where that is enough
-    """
+    """How much longer a motion has to stand where chords would cut off a full stop by too much; it need not be looked at
+    where it is known to leave a full stop with limited jerk (`jerk_limited`), and that is enough."""
     half = machine.dt / 2
     acceleration, jerk = (
         float(np.linalg.norm(machine.limits(q, toolpath.axes))) for q in ("acceleration", "jerk")
@@ -150,13 +147,8 @@ def _from_chord(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatArray, FloatArray]:
-    """By how much a motion and its chords miss the vertices.
-
-    dt : sample period [s]
-
-    Returns two arrays (M+1,) [mm]: by how much the motion itself misses each vertex, and by how much the
-    chords miss it in the worst phase of the samples; 0 where the motion rests.
-    """
+    """Two arrays (M+1,) [mm]: by how much a motion itself misses each vertex, and by how much the chords between samples dt
+    [s] apart miss it in the worst phase; 0 where the motion rests."""
     fastest = 0.0
 
     def seen() -> Iterator[Trajectory]:

@@ -37,10 +37,7 @@ PERIOD_ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Filters:
-    """Moving averages in series.
-
-    Raises InputError unless there is one at least, and all are positive and finite.
-    """
+    """Moving averages in series. Raises InputError unless there is one at least, all positive and finite."""
 
     times: tuple[float, ...]  # their lengths [s]
 
@@ -73,11 +70,8 @@ class Filters:
         return self._response(t, 2)
 
     def pulse(self, t: FloatArray, speed: float, duration: float) -> FloatArray:
-        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse that begins at 0 (eq. 5, for Tv < Td too).
-
-        speed    : V [mm/s]
-        duration : Tv [s], any
-        """
+        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse of that `speed` V [mm/s] that begins at 0 and lasts for
+        any `duration` Tv [s] (eq. 5, for Tv < Td too)."""
         t = np.asarray(t, float)
         return speed * (self.step(t) - self.step(t - duration))
 
@@ -122,12 +116,8 @@ def lengths_from_limits(V: FloatArray, A: FloatArray, J: FloatArray) -> tuple[Fl
 
 
 def suppressing(T1: FloatArray, T2: FloatArray, periods: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 (S,) [s] lengthened to multiples of the periods [s] of one or two modes (eq. 10).
-
-    With one mode one filter is made a multiple of its period, the other stays as it is.
-
-    Raises ValueError for none or more than two periods.
-    """
+    """T1 >= T2 (S,) [s] lengthened to multiples of the periods [s] of one or two modes (eq. 10); of one mode one filter.
+    Raises ValueError for other numbers of periods."""
     if len(periods) not in (1, 2):
         raise ValueError(f"{len(periods)} periods; two filters suppress one or two modes")
     one, other = periods[0], periods[1] if len(periods) == 2 else None

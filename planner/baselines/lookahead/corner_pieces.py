@@ -118,12 +118,8 @@ def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[
 def _spline_at_rest(
     duration: FloatArray, position: FloatArray, last: Array
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Velocity, acceleration and jerk (n, A) at the starts of n pieces on moves that begin and end at rest.
-
-    duration : (n,) [s]
-    position : (n + moves, A) points before and after every piece, move after move [mm]
-    last     : (n + moves,) True at the last point of each move
-    """
+    """Velocity, acceleration and jerk (n, A) at the starts of n pieces, of durations (n,) [s], on moves that begin and end at
+    rest, through points `position` (n + moves, A) [mm], of which some are the `last` (n + moves,) of their move."""
     from scipy.linalg import solve_banded  # 0.2 s
 
     start = np.flatnonzero(~last)  # the points that a piece starts at

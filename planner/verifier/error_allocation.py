@@ -11,11 +11,9 @@ own curvature, all over the linear axes.
     feed / sqrt(A(n)/kappa) = sqrt( |a_n| / A(n) ) <= 1.
 
 Proof: n is a unit vector along a_n, so |a_n| = a_n.n = a.n (t.n = 0) = sum_k a_k(t) n_k <= sum_k a_k |n_k|
-for every acceleration within the axes' limits; and |a_n| <= A_max is the other limit itself. Nothing else was
-used: it holds for every method, corner, path and direction t, so that errors of the velocity cannot break it.
-The sum is attained where every axis gives all it has, so the bound cannot be smaller for all motions; and a
-motion that takes a corner of curvature kappa as if nothing limited the acceleration exceeds it as soon as
-kappa feed^2 > A(n).
+for every acceleration within the axes' limits; and |a_n| <= A_max is the other limit itself. It holds for every
+method, corner, path and direction t, so that errors of the velocity cannot break it, and it is attained where every axis
+gives all it has.
 
 **Eq. (18), the budget.** Let the motion pass the vertex at the distance d from it. What drives are given are
 samples: over a period dt the chord bows from the motion by c a, c <= dt^2/8, wherever the samples fall (to second

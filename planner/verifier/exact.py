@@ -14,10 +14,7 @@ block out or is not at its end, is lost. What stays within a h^2 / 8 of one plac
 samples; that it is left out is not seen.
 
 The tolerance stays the budget of blocks under G64, and of the half of a block that is beside one without a
-full stop between: the corner there may be rounded.
-
-How far a motion that is lost was off is measured within the tolerance: from the nearest of the pieces that it
-can be on, in order.
+full stop between: the corner there may be rounded. How far a motion that is lost was off is measured within it.
 """
 
 from collections.abc import Iterator

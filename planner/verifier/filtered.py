@@ -16,14 +16,9 @@ v/T1, a setpoint that jumps by d makes a jump d/T1 of the first derivative, and 
 nanometres, and with "hold" on the way of the motion (measured in tests/verifier/test_filtered.py). The
 integrals begin anew in every chunk: no digit is lost in long motions.
 
-The filtered motion is matched with the path like any other (matching.py): contour, vertices, order. Limits
-are judged on the setpoints: a mean never exceeds what it is the mean of. A full stop is a vertex like any
-other: the filtered motion need not rest there.
-
-Nothing but the setpoints is looked at, whether or not the motion that they were taken from can be asked: the
-verdict of a plan and that on its file have the same numbers here.
-
-What the machine does between two setpoints, as the judge sees it: the signal that its filters get.
+The filtered motion is matched with the path like any other (matching.py); a full stop is a vertex, at which it need
+not rest. Limits are judged on the setpoints: a mean never exceeds what it is the mean of. Nothing else is looked at, so
+that the verdict of a plan and that on its file have the same numbers here.
 
 With setpoints p0 and p1 at the ends of a period h, velocities v0 and v1, and its share w,
 

@@ -22,14 +22,9 @@ STOP_ROUNDING = 1e-3
 
 
 def joint_times(reading: Observed, pieces: ProgramPieces) -> FloatArray:
-    """(M+1,) times at which the motion passes the joints of M segments [s], in order: each when it is
-    nearest, and no earlier than the joint before. That of a joint that is not reached is that of the last one
-    before that is: its own is 0.
-
-    A late time hides no fault: a joint is compared with the chords run while the piece before it is possible,
-    so that its time reaches only as far as the motion stays, in order, within the tolerance of that piece;
-    the joints behind that it delays were passed within it. An error of the tolerance is allowed there anyway.
-    """
+    """(M+1,) times at which the motion passes the joints of M segments [s], in order: each when it is nearest, and no
+    earlier than the joint before, the time of one that is not reached. A late time hides no fault: a joint is compared
+    with the chords run while the piece before it is possible, within the tolerance of that piece."""
     near: FloatArray = reading.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     return np.maximum.accumulate(near)
 

@@ -20,9 +20,7 @@ so that of the mean
 
     |a - (a.u) u| <= N + A sin(min(N w / v, pi/2)),      v = chord / w - A w,
 
-where the second term is taken off.
-
-Only columns that were delivered are judged as columns, and compared with the positions.
+where the second term is taken off. Only columns that were delivered are judged, and compared with the positions.
 """
 
 import numpy as np

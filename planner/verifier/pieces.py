@@ -35,22 +35,15 @@ JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
 
 
 class ProgramPieces(NamedTuple):
-    """N pieces over A axes, the N+1 vertices around them, the K arcs and curves; few arrays, as calls cost.
+    """N pieces over A axes, the N+1 vertices around them, the K arcs and curves; few arrays, as calls cost."""
 
-    vertex : (N+1, A) [mm]
-    joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real: of the program
-    piece  : (N,) `PIECE`: budget [mm]; feed in all axes [mm/s]; word, that in the axes of group `by` alone;
-             x0, x1 range of the arc's parameter [mm], or of the curve's [-]; arc: row of an arc, -1 for a
-             line, -2 - row of a curve; segment
-    frame  : (K, 4, A) center, e1, e2, drift of an arc; control points of a curve
-    turn   : (K, 2) radius [mm], rate [rad/mm] of an arc; weights of the inner control points of a curve
-    """
-
-    vertex: FloatArray
-    joint: Array
+    vertex: FloatArray  # (N+1, A) [mm]
+    joint: Array  # (N+1,) `JOINT`: budget [mm]; stop (0 or 1); real: of the program
+    # (N,) `PIECE`: budget [mm]; feed in all axes [mm/s]; word, that in the axes of group `by` alone; x0, x1 range of the arc's
+    # parameter [mm], or of the curve's [-]; arc: row of an arc, -1 for a line, -2 - row of a curve; segment
     piece: Array
-    frame: FloatArray
-    turn: FloatArray
+    frame: FloatArray  # (K, 4, A) center, e1, e2, drift of an arc; control points of a curve
+    turn: FloatArray  # (K, 2) radius [mm], rate [rad/mm] of an arc; weights of the inner control points of a curve
 
 
 def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPieces:

@@ -1,10 +1,8 @@
 """One reading of a motion: its delivered samples and, in step with them, what lies between.
 
-Where the judge looks between the samples: at times of its own, which nobody can prepare for.
-
 A planned motion can be asked at any time. Its pieces, on which everything is smooth, and the periods of the
 machine are cut into cells, and every cell is looked at once, at a time drawn at random from a generator with
-a fixed seed:
+a fixed seed, which nobody can prepare for:
 
     every piece    at least `PER_PIECE` cells: more than the three places at which the planner looks at a piece itself
     every period   at least `PER_PERIOD` cells, whatever the pieces are said to be, and as many as keep the chords between

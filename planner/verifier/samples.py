@@ -20,8 +20,7 @@ would pass: the quantity cannot be judged by the positions.
 Rest. A motion that rests at its first and last sample has run, over the period h next to it, per axis at most
 a h^2 / 2, and j h^3 / 6 where jerk is limited; its velocity is zero there, and with limited jerk its
 acceleration too. Where a program asks for a speed at an end, the same holds of what the motion runs beside that.
-A file whose last samples are missing shows that here, although its end may be as near to the program's as the
-tolerance asks.
+A file whose last samples are missing shows that here.
 
 Seconds. No program takes 200 times as long as at its feed, but for times in milliseconds or less.
 """
@@ -37,8 +36,8 @@ from planner.verifier.excess import Fault, Kind
 from planner.verifier.findings import measured
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import ACCELERATION, JERK
+from planner.verifier.matching import STILL
 from planner.verifier.pieces import PERIOD_ROUNDING, RATIO_ROUNDING
-from planner.verifier.stops import STILL
 from planner.verifier.stream import Observed
 from planner.verifier.worst import ROUNDING_ULPS, Limits
 

@@ -17,11 +17,19 @@ from planner.verifier.feed import Feeds
 from planner.verifier.given import DERIVATIVES
 from planner.verifier.kernel import kernel
 from planner.verifier.limits import FEED, GROUPS, look_at_axes, rows_of
-from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, match_samples, new_match, nowhere
+from planner.verifier.matching import (
+    SEARCH_MAX,
+    SEARCHED,
+    AtStop,
+    Located,
+    Match,
+    match_samples,
+    new_match,
+    nowhere,
+)
 from planner.verifier.other_limits import look_at_power, look_at_tangential, look_at_user_limits
 from planner.verifier.passing import Bounds, Chords
 from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
-from planner.verifier.stops import AtStop
 from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst, state_of
 
 BLOCK_SAMPLES = SIZES.judged_at_once

@@ -26,7 +26,7 @@ from planner.base.sizes import SIZES
 from planner.delivery.filtered_setpoints import PER_PERIOD, FilteredSetpoints
 from planner.delivery.pacing import MotionRuns, Timed, TimedT, runs_of, slower_runs, standing_longer
 from planner.delivery.path_errors import SPARE, Errors, PathErrors
-from planner.delivery.periods import Standing, standing, with_standstills
+from planner.delivery.periods import standing, with_standstills
 from planner.delivery.rests import mean_of_filters
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
@@ -78,9 +78,9 @@ class Behind:
 
     def errors(self, motion: MotionInTime) -> Errors:
         """Errors of what the machine makes of a motion's setpoints; without filters of the motion itself."""
-        return (
-            self.path_errors(motion) if self._setpoints is None else self.path.of(self._setpoints.of(motion))
-        )
+        if self._setpoints is None:
+            return self.path_errors(motion)
+        return self.path.of(self._setpoints.of(motion))
 
     def path_errors(self, motion: MotionInTime) -> Errors:
         """Errors of the motion itself."""
@@ -108,8 +108,7 @@ class Behind:
     def beside_stop(self, motion: Timed, time: FloatArray) -> Array:
         """(n,) True where filters hold something of two runs at `time` (n,): a longer rest is enough."""
         runs = runs_of(motion)
-        early, late = runs_within(runs.begin, runs.end, time, self.filters.delay)
-        return early < late
+        return np.less(*runs_within(runs.begin, runs.end, time, self.filters.delay))
 
     def rests(self, motion: Timed, runs: MotionRuns) -> FloatArray:
         """(G,) the shortest rest behind each run that keeps the filtered tolerance [s]; 0 behind the last."""
@@ -156,10 +155,8 @@ def stops_between(early: Array, late: Array, count: int) -> Array:
 
 
 def rested(behind: Behind, motion: TimedT) -> TimedT:
-    """The motion with the shortest rests at its full stops that keep the tolerance behind filters.
-
-    It has the standstills that its samples need.
-    """
+    """The motion with the shortest rests at its full stops that keep the tolerance behind filters, and with the
+    standstills that its samples need."""
     runs = runs_of(motion)
     gap = np.append(runs.begin[1:] - runs.end[:-1], 0.0)
     longer = standing_longer(motion, runs, np.maximum(behind.rests(motion, runs) - gap, 0.0))
@@ -168,10 +165,7 @@ def rested(behind: Behind, motion: TimedT) -> TimedT:
 
 def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
     """The motion with runs slowed down and rests lengthened until the filtered motion keeps the tolerance,
-    and with the standstills that its samples need.
-
-    Returns the motion itself for a machine without filters.
-    """
+    and with the standstills that its samples need; as it is for a machine without filters."""
     if machine.fir is None:
         return motion
     behind, runs = Behind(toolpath, machine), runs_of(motion)
@@ -193,26 +187,18 @@ def kept(motion: TimedT, toolpath: Toolpath, machine: Machine) -> TimedT:
         places = behind.places(made, of_path)
         if not len(places.time):
             break
-        early, late = runs_within(*_later(*timed.behind(longer), stands), places.time, delay)
+        begin, end = timed.behind(longer)
+        stood = np.append(0.0, np.cumsum(stands.by))  # what the samples need
+        begin = begin + stood[np.searchsorted(stands.at, begin, side="right")]
+        end = end + stood[np.searchsorted(stands.at, end)]
+        early, late = runs_within(begin, end, places.time, delay)
         own = early == late
-        more = np.clip(
-            1.0 / np.sqrt(places.less[own]), min(FACTOR_LEAST ** (n + 1), FACTOR_MOST), FACTOR_MOST
-        )
+        least_more = min(FACTOR_LEAST ** (n + 1), FACTOR_MOST)
         worst = np.ones(len(runs))
-        np.maximum.at(worst, late[own], more)
+        np.maximum.at(worst, late[own], np.clip(1.0 / np.sqrt(places.less[own]), least_more, FACTOR_MOST))
         factor = factor * worst
         short = stops_between(early, late, len(runs))
-        least[short] = np.minimum(
-            np.maximum(rest, gap)[short] + FLOOR_STEP * delay * 2.0 ** again[short], delay
-        )
+        grown = np.maximum(rest, gap)[short] + FLOOR_STEP * delay * 2.0 ** again[short]
+        least[short] = np.minimum(grown, delay)
         again[short] += 1
     return made
-
-
-def _later(begin: FloatArray, end: FloatArray, stands: Standing) -> tuple[FloatArray, FloatArray]:
-    """Begins and ends of runs (G,) [s] with the standstills of the samples."""
-    later = np.append(0.0, np.cumsum(stands.by))
-    return (
-        begin + later[np.searchsorted(stands.at, begin, side="right")],
-        end + later[np.searchsorted(stands.at, end)],
-    )

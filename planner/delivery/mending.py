@@ -90,8 +90,10 @@ def _slowed(
             place = place._replace(begin=last.begin, by=max(d, last.by))
             places.pop()
         places.append(place)
-    now = slowed.slowest(places)
-    return slowed.with_places(each._replace(by=each.by * p) for each, p in zip(places, now, strict=True))
+    now = zip(places, slowed.slowest(places), strict=True)
+    return Slowed(
+        motion=slowed.motion, places=(*slowed.places, *(each._replace(by=each.by * p) for each, p in now))
+    )
 
 
 def _rests(
@@ -102,24 +104,17 @@ def _rests(
     k, n = np.searchsorted(edges, [begin + AT_REST, end + AT_REST])  # jumps are of what is behind the rest
     low, high = np.searchsorted(edges, begin - within), np.searchsorted(edges, end + within, side="right")
 
-    def rests(times: FloatArray) -> FloatArray:
-        """Those of times, in any order, at which nothing moves."""
-        if not len(times):
-            return times
-        single, which = np.unique(times, return_inverse=True)
-        seen = motion.at(single, 1.0)
-        still = seen.feed <= STANDS[0]
-        if jerk_limited:  # nor begins to with a jump of the acceleration
-            still &= np.abs(seen.acceleration).max(axis=1) <= STANDS[1]
-        return times[still[which]]
-
     def first(times: FloatArray, none: float) -> float:
-        """The first of them, looked for in larger and larger parts."""
+        """The first of some times, in any order, at which nothing moves, looked for in larger and larger parts."""
         part = PART
         while len(times):
-            found = rests(times[:part])
-            if len(found):
-                return float(found[0])
+            single, which = np.unique(times[:part], return_inverse=True)
+            seen = motion.at(single, 1.0)
+            still = seen.feed <= STANDS[0]
+            if jerk_limited:  # nor begins to with a jump of the acceleration
+                still &= np.abs(seen.acceleration).max(axis=1) <= STANDS[1]
+            if still.any():
+                return float(times[still[which].argmax()])
             times, part = times[part:], 4 * part
         return none
 

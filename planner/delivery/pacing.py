@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.motion.axis_motion import AxisMotion
+from planner.motion.axis_motion import LEVELS, AxisMotion
 from planner.motion.timing import Motion
 
 # Velocities and accelerations below this fraction of the largest are none [-]: rounding of sums.
@@ -56,13 +56,10 @@ def runs_of(motion: Timed) -> MotionRuns:
         first = np.searchsorted(run, np.arange(run[-1] + 1))
         last = np.append(first[1:], len(run)) - 1  # the last piece of a run is its standstill
     else:
-        rest = np.append(_rests(motion), True)
-        begins = np.flatnonzero(rest[:-1])
-        ends = np.append(begins[1:], len(motion))
-        moving = [
-            motion.velocity[a:b].any() or motion.jerk[a:b].any() for a, b in zip(begins, ends, strict=True)
-        ]
-        first, last = begins[moving], ends[moving]
+        begins = np.flatnonzero(_rests(motion))
+        moves = motion.velocity.any(axis=1) | motion.jerk.any(axis=1)
+        moving = np.logical_or.reduceat(moves, begins)
+        first, last = begins[moving], np.append(begins[1:], len(motion))[moving]
     return MotionRuns(first=first, last=last, begin=edges[first], end=edges[last])
 
 
@@ -90,19 +87,12 @@ def slower_runs(motion: TimedT, runs: MotionRuns, factor: FloatArray) -> TimedT:
     if isinstance(motion, Motion):
         law = motion.law
         t = law.t[0] + np.append(0.0, np.cumsum(lasting))
-        slower = dataclasses.replace(
-            law,
-            t=t[:-1],
-            feed=law.feed / by,
-            acc_s=law.acc_s / by**2,
-            jerk_s=law.jerk_s / by**3,
-            end=float(t[-1]),
-        )
+        rates = {"feed": law.feed / by, "acc_s": law.acc_s / by**2, "jerk_s": law.jerk_s / by**3}
+        slower = dataclasses.replace(law, t=t[:-1], end=float(t[-1]), **rates)
         return dataclasses.replace(motion, law=slower)
     t = np.append(0.0, np.cumsum(lasting))
     rates = {
-        name: getattr(motion, name) / by[:, None] ** power
-        for power, name in enumerate(("velocity", "acceleration", "jerk"), start=1)
+        name: getattr(motion, name) / by[:, None] ** power for power, name in enumerate(LEVELS[1:], start=1)
     }
     return dataclasses.replace(motion, t=t[:-1], end=float(t[-1]), **rates)
 

@@ -115,10 +115,7 @@ class PathErrors:
 @njit(cache=True, error_model="numpy")
 def _from_link(chain, pieces, legs, i, q, out):
     """Distance of the point q (A,) from the segment of link i near that link [mm], and where on the link its
-    foot is, 0 to 1.
-
-    out : (4, A) for the leg's point and derivatives
-    """
+    foot is, 0 to 1; out (4, A) for the leg's point and derivatives."""
     off_sq, share = from_chord(chain.vertex[i], chain.vertex[i + 1], q)
     leg = pieces.leg[i]
     if leg < 0:
@@ -139,14 +136,12 @@ def _from_link(chain, pieces, legs, i, q, out):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _measure(chain, pieces, legs, t, point, link, near, near_time, worst, ratio):
-    """The errors of n places at times `t` (n,) [s] and points (n, A) [mm], which are at the links `link`
-    (n,).
+    """The errors of n places at times `t` (n,) [s] and points (n, A) [mm], which are at the links `link` (n,); returns the
+    vertex next to the last place.
 
     near, near_time : (N+1,) of the vertices [mm] [s], written where the motion passes them
     worst           : (N,) of the pieces [-], raised
     ratio           : (n,) error over budget of each place, written
-
-    Returns the vertex next to the last place.
     """
     out, at = np.empty((4, point.shape[1])), 0
     for n in range(len(link)):

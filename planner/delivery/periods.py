@@ -18,7 +18,7 @@ part shifts the chord along itself; not so at full stops, and at corners that ar
 
 import dataclasses
 from collections.abc import Iterator
-from typing import NamedTuple, Protocol, Self, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -48,13 +48,7 @@ REDUCED_INSIDE = 2.0
 LEFT_MIN = 0.1
 
 
-class _Waiting(Protocol):
-    """A motion that can stand longer."""
-
-    def waiting(self, at: FloatArray, by: FloatArray) -> Self: ...
-
-
-WaitingT = TypeVar("WaitingT", bound=_Waiting)
+WaitingT = TypeVar("WaitingT", bound=MotionInTime)
 
 
 class Standing(NamedTuple):
@@ -67,11 +61,8 @@ class Standing(NamedTuple):
 def standing(
     motion: MotionInTime, toolpath: Toolpath, machine: Machine, jerk_limited: bool = False
 ) -> Standing:
-    """How much longer a motion has to stand where chords would cut off a full stop by too much.
-
-    jerk_limited : whether the motion is known to leave a full stop with limited jerk, not with full
-                   acceleration at once: then it need not be looked at where that is enough
-    """
+    """How much longer a motion has to stand where chords would cut off a full stop by too much; it need not be looked at
+    where it is known to leave a full stop with limited jerk (`jerk_limited`), and that is enough."""
     half = machine.dt / 2
     acceleration, jerk = (
         float(np.linalg.norm(machine.limits(q, toolpath.axes))) for q in ("acceleration", "jerk")
@@ -80,13 +71,13 @@ def standing(
     nothing = Standing(np.empty(0), np.empty(0))
     if from_rest <= USED * toolpath.tolerance.min():
         return nothing
-    arrival, departure, place, block = _rests(motion, machine.dt)
-    if not len(arrival):
+    *rests, block = _rests(motion, machine.dt)
+    if not len(block):
         return nothing
     segment = np.searchsorted(toolpath.block, block)
     allowed = USED * np.minimum(toolpath.tolerance[segment], toolpath.tolerance[segment + 1])
-    waits = _waits(motion, arrival, departure, place, allowed, machine.dt)
-    return Standing(arrival[waits > 0], waits[waits > 0])
+    waits = _waits(motion, (rests[0], rests[1], rests[2]), allowed, machine.dt)
+    return Standing(rests[0][waits > 0], waits[waits > 0])
 
 
 def with_standstills(motion: WaitingT, stands: Standing) -> WaitingT:
@@ -106,22 +97,18 @@ def _rests(motion: MotionInTime, dt: float) -> tuple[FloatArray, FloatArray, Flo
 
 
 def _waits(
-    motion: MotionInTime,
-    arrival: FloatArray,
-    departure: FloatArray,
-    place: FloatArray,
-    allowed: FloatArray,
-    dt: float,
+    motion: MotionInTime, rests: tuple[FloatArray, FloatArray, FloatArray], allowed: FloatArray, dt: float
 ) -> FloatArray:
-    """(n,) by how much longer the motion has to rest at each place [s]."""
+    """(n,) by how much longer the motion has to rest at each of the `rests`, arrival, departure and place [s]."""
+    arrival, departure, place = rests
     tau = np.linspace(0.0, dt, PLACES + 1)
     waits, waited = np.zeros(len(arrival)), 0.0
     gap = np.append(arrival[1:] - departure[:-1], np.inf)
     rows = max(CHUNK // len(tau), 1)
     for first in range(0, len(arrival), rows):
         some = slice(first, first + rows)
-        before = _off(motion, arrival[some, None] - tau, place[some], dt)
-        behind = _off(motion, departure[some, None] + tau, place[some], dt)
+        before = _positions(motion, arrival[some, None] - tau, dt) - place[some, None]
+        behind = _positions(motion, departure[some, None] + tau, dt) - place[some, None]
         apart = [np.linalg.norm(off, axis=2) for off in (before, behind[:, ::-1])]
         risky = np.minimum(*apart).max(axis=1) > allowed[some]
         for r in np.flatnonzero(risky):
@@ -143,11 +130,6 @@ def _waits(
     return waits
 
 
-def _off(motion: MotionInTime, times: FloatArray, place: FloatArray, dt: float) -> FloatArray:
-    """(n, m, A) the motion at the times (n, m) [s], from the places (n, A)."""
-    return _positions(motion, times, dt) - place[:, None]
-
-
 def _positions(motion: MotionInTime, times: FloatArray, dt: float) -> FloatArray:
     """(*times.shape, A) where the motion is [mm]."""
     single, which = np.unique(np.clip(times, 0.0, motion.end), return_inverse=True)
@@ -165,13 +147,8 @@ def _from_chord(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def missed(motion: MotionInTime, toolpath: Toolpath, dt: float) -> tuple[FloatArray, FloatArray]:
-    """By how much a motion and its chords miss the vertices.
-
-    dt : sample period [s]
-
-    Returns two arrays (M+1,) [mm]: by how much the motion itself misses each vertex, and by how much the
-    chords miss it in the worst phase of the samples; 0 where the motion rests.
-    """
+    """Two arrays (M+1,) [mm]: by how much a motion itself misses each vertex, and by how much the chords between samples dt
+    [s] apart miss it in the worst phase; 0 where the motion rests."""
     fastest = 0.0
 
     def seen() -> Iterator[Trajectory]:
@@ -232,13 +209,10 @@ def with_less_tolerance(
     if not over.any():
         return None
     tolerance = planned.tolerance - times * REDUCED_BY * np.where(over, far - allowed, 0.0)
-    hopeless = over & (
-        (tolerance < LEFT_MIN * programmed.tolerance) | (far - near > (1.0 - LEFT_MIN) * allowed)
-    )
+    hopeless = (tolerance < LEFT_MIN * programmed.tolerance) | (far - near > (1.0 - LEFT_MIN) * allowed)
+    hopeless &= over
     tolerance[hopeless] = planned.tolerance[hopeless]
-    along = planned.along
-    if beside:
-        along = np.minimum(along, lesser_end(tolerance))
+    along = np.minimum(planned.along, lesser_end(tolerance)) if beside else planned.along
     return _with_tolerance(planned.with_joints(hopeless, Joint.STOP), tolerance, along)
 
 

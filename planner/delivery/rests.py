@@ -46,9 +46,7 @@ class Mean:
         before, after : (g, C, A) where the motion is `inside` before and after each stop, seen from it [mm]
         budget        : (g,) how near it has to come [mm]
         """
-        steps = _shortest(self.into @ before, self.out @ after, budget)
-        found: FloatArray = steps * (self.length / STEPS)
-        return found
+        return np.asarray(_shortest(self.into @ before, self.out @ after, budget) * (self.length / STEPS))
 
 
 def mean_of_filters(filters: Filters) -> Mean:
@@ -90,10 +88,9 @@ def _shortest(before, after, budget):
         low, high = 0.0, before.shape[1] - 1.0
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            if _nearest(before[k], after[k], middle) <= budget[k]:
-                high = middle
-            else:
-                low = middle
+            low, high = (
+                (low, middle) if _nearest(before[k], after[k], middle) <= budget[k] else (middle, high)
+            )
         rest[k] = high
     return rest
 

@@ -26,7 +26,7 @@ the same rows as an axis has; q', q'', q''' follow from r', r'', r''' exactly (b
 the path is such a q with q' = 1. Between grid points the same measures hold as for the axes: points where the
 rows are not close to linear and a margin (feedrate/sampling/user_rows.py), tightening
 (planning/optimal/tighten.py). Methods `optimal` and `second-order` plan with these limits; the verdict judges
-the motions of all methods by them, from the delivered positions (verifier/user_limits.py).
+the motions of all methods by them, from the delivered positions (verifier/other_limits.py).
 """
 
 from abc import ABC, abstractmethod

@@ -15,6 +15,8 @@ itself on straight pieces. It has a kink where the motion turns back, hence step
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -24,6 +26,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.base.kernels import njit
 from planner.base.search import last_not_after, nearest
+from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import COLUMNS, Trajectory
 
 # Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this fraction of it [-].
@@ -64,10 +67,19 @@ class AxisMotion:
     def __len__(self) -> int:
         return len(self.t)
 
+    @classmethod
+    def of(
+        cls, state: Iterable[FloatArray], t: FloatArray, end: float, toolpath: Toolpath, segment: Array
+    ) -> AxisMotion:
+        """Pieces that begin at t (L,) [s] with a `state` (4, L, A), position to jerk, each on a `segment` (L,) of a path."""
+        columns: dict[str, Any] = dict(zip(LEVELS, state, strict=True))
+        columns |= {"block": toolpath.block[segment], "line": toolpath.line[segment]}
+        return cls(axes=toolpath.axes, radius=toolpath.radius, t=t, end=end, **columns)
+
     @cached_property
     def s(self) -> FloatArray:
         """(L+1,) arc length at the start of each piece, and at the end of the motion [mm]."""
-        s = np.empty(len(self) + 1)
+        s = np.zeros(len(self) + 1)
         _arc_lengths(np.append(self.t, self.end), self.velocity, self.acceleration, self.jerk, s)
         return s
 
@@ -77,8 +89,8 @@ class AxisMotion:
 
     def columns(self, times: FloatArray) -> dict[str, Any]:
         """Those of a trajectory at ascending times (T,) within [0, end], but for the times."""
-        rates = self.velocity, self.acceleration, self.jerk
-        pieces = self.t, self.position, *rates, self.s, float(self.end)
+        state = (self.position, self.velocity, self.acceleration, self.jerk)
+        pieces = self.t, *state, self.s, float(self.end)
         motion, s, feed, piece = _sample(pieces, times)
         found: dict[str, Any] = dict(zip(LEVELS, motion, strict=True))
         return found | {"s": s, "feed": feed, "block": self.block[piece], "line": self.line[piece]}
@@ -89,22 +101,17 @@ class AxisMotion:
         place = self.at(self.t[before], 1.0).position  # a piece begins there
         later = np.zeros(len(self) + 1)
         np.add.at(later, before, by)
-        later = np.cumsum(later)[:-1]
-        rest = {name: np.zeros_like(place) for name in LEVELS[1:]}
-        columns = {
-            name: np.insert(getattr(self, name), before, row, axis=0)
-            for name, row in ({"position": place} | rest).items()
+        t, segment = self.t + np.cumsum(later)[:-1], np.maximum(before - 1, 0)
+        rows = {
+            "t": t[before] - by,
+            "block": self.block[segment],
+            "line": self.line[segment],
+            "position": place,
         }
-        segment = np.maximum(before - 1, 0)
-        return AxisMotion(
-            axes=self.axes,
-            radius=self.radius,
-            t=np.insert(self.t + later, before, (self.t + later)[before] - by),
-            block=np.insert(self.block, before, self.block[segment]),
-            line=np.insert(self.line, before, self.line[segment]),
-            end=self.end + float(by.sum()),
-            **columns,
-        )
+        rows |= {name: np.zeros_like(place) for name in LEVELS[1:]}
+        whole = dict(vars(self), t=t)
+        columns = {name: np.insert(whole[name], before, row, axis=0) for name, row in rows.items()}
+        return dataclasses.replace(self, end=self.end + float(by.sum()), **columns)
 
 
 @njit(cache=True, error_model="numpy")
@@ -154,8 +161,7 @@ def _arc_length(v, a, j, tau):
 
 @njit(cache=True, error_model="numpy")
 def _arc_lengths(t, velocity, acceleration, jerk, s):
-    """Arc length s (L+1,) [mm] at the times t (L+1,) between the pieces."""
-    s[0] = 0.0
+    """Arc length s (L+1,) [mm] at the times t (L+1,) between the pieces, from s[0] = 0 on."""
     for m in range(len(velocity)):
         s[m + 1] = s[m] + _arc_length(velocity[m], acceleration[m], jerk[m], t[m + 1] - t[m])
 
@@ -164,8 +170,7 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 def _sample(pieces, times):
     """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,).
 
-    pieces : t (L,), position, velocity, acceleration and jerk (L, A) and end of `AxisMotion`, before the end
-             s (L+1,)
+    pieces : t, position, velocity, acceleration, jerk, s and end of `AxisMotion`
     """
     t, position, velocity, acceleration, jerk, s, end = pieces
     samples, axes = len(times), position.shape[1]

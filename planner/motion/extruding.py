@@ -30,11 +30,10 @@ AT_JOINT = 1e-9
 
 
 class _Passed(NamedTuple):
-    """Of the K joints of an extrusion: the length that is run when the motion passes them (K,) [mm], and when
-    it arrives there and leaves (K,) [s]."""
+    """The K joints of an extrusion."""
 
-    s: FloatArray
-    arrival: FloatArray
+    s: FloatArray  # (K,) length that is run when the motion passes them [mm]
+    arrival: FloatArray  # (K,) when it arrives there and leaves [s]
     departure: FloatArray
 
 
@@ -106,13 +105,11 @@ class Extruding:
         """The moves of the extruder alone."""
         fed, passed = self.extrusion, self._passed
         joint = np.searchsorted(fed.joint, fed.at)
-        one = np.ones(len(fed.at))
-        lasts, jerk = rest_to_rest_phases(
-            np.abs(fed.amount), fed.speed, fed.limits[1] * one, fed.limits[2] * one
-        )
+        a, j = np.outer(fed.limits[1:], np.ones(len(fed.at)))
+        lasts, jerk = rest_to_rest_phases(np.abs(fed.amount), fed.speed, a, j)
         jerk = jerk * np.sign(fed.amount)[:, None]
         time = np.cumsum(lasts, axis=1) - lasts
-        state = np.zeros((len(one), PHASES, 3))
+        state = np.zeros((len(fed.at), PHASES, 3))
         for k in range(PHASES - 1):
             h, j = lasts[:, k], jerk[:, k]
             p, v, a = (state[:, k, m] for m in range(3))
@@ -138,12 +135,13 @@ class Extruding:
         columns[:, 0] = np.where(before, fed.arrive[0], fed.leave[k] + amount * np.clip(share, 0.0, 1.0))
         columns[:, 1:] = np.where(going, ratio * along, 0.0).T
         columns[:, 1] = np.where(going, ratio * seen.feed, 0.0)
-        if len(fed.at):
-            self._add_alone(seen.t, columns)
+        self._add_alone(seen.t, columns)
         return columns
 
     def _add_alone(self, t: FloatArray, columns: FloatArray) -> None:
         """Add the moves alone at the times (T,) to the columns (T, 4)."""
+        if not len(self.extrusion.at):
+            return
         alone, fed = self._alone, self.extrusion
         until = self._passed.departure[alone.joint]
         last = alone.joint == len(fed.joint) - 1

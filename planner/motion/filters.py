@@ -37,10 +37,7 @@ PERIOD_ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Filters:
-    """Moving averages in series.
-
-    Raises InputError unless there is one at least, and all are positive and finite.
-    """
+    """Moving averages in series. Raises InputError unless there is one at least, all positive and finite."""
 
     times: tuple[float, ...]  # their lengths [s]
 
@@ -73,11 +70,8 @@ class Filters:
         return self._response(t, 2)
 
     def pulse(self, t: FloatArray, speed: float, duration: float) -> FloatArray:
-        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse that begins at 0 (eq. 5, for Tv < Td too).
-
-        speed    : V [mm/s]
-        duration : Tv [s], any
-        """
+        """(n,) velocity [mm/s] at times t (n,) [s] of a pulse of that `speed` V [mm/s] that begins at 0 and lasts for
+        any `duration` Tv [s] (eq. 5, for Tv < Td too)."""
         t = np.asarray(t, float)
         return speed * (self.step(t) - self.step(t - duration))
 
@@ -122,22 +116,12 @@ def lengths_from_limits(V: FloatArray, A: FloatArray, J: FloatArray) -> tuple[Fl
 
 
 def suppressing(T1: FloatArray, T2: FloatArray, periods: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 (S,) [s] lengthened to multiples of the periods [s] of one or two modes (eq. 10).
-
-    With one mode one filter is made a multiple of its period, the other stays as it is.
-
-    Raises ValueError for none or more than two periods.
-    """
-    if len(periods) == 1:
-        one = (_multiple(T1, periods[0]), T2), (T1, _multiple(T2, periods[0]))
-    elif len(periods) == 2:
-        one = (
-            (_multiple(T1, periods[0]), _multiple(T2, periods[1])),
-            (_multiple(T1, periods[1]), _multiple(T2, periods[0])),
-        )
-    else:
+    """T1 >= T2 (S,) [s] lengthened to multiples of the periods [s] of one or two modes (eq. 10); of one mode one filter.
+    Raises ValueError for other numbers of periods."""
+    if len(periods) not in (1, 2):
         raise ValueError(f"{len(periods)} periods; two filters suppress one or two modes")
-    (a1, a2), (b1, b2) = one
+    one, other = periods[0], periods[1] if len(periods) == 2 else None
+    a1, a2, b1, b2 = _multiple(T1, one), _multiple(T2, other), _multiple(T1, other), _multiple(T2, one)
     first = a1 + a2 <= b1 + b2
     x, y = np.where(first, a1, b1), np.where(first, a2, b2)
     return np.maximum(x, y), np.minimum(x, y)
@@ -148,6 +132,8 @@ def damped_period(frequency: float, damping: float) -> float:
     return 1.0 / (frequency * float(np.sqrt(1.0 - damping**2)))
 
 
-def _multiple(T: FloatArray, period: float) -> FloatArray:
-    """T (S,) [s] rounded up to whole periods, one at least."""
-    return np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
+def _multiple(T: FloatArray, period: float | None) -> FloatArray:
+    """T (S,) [s] rounded up to whole periods, one at least; as it is without a period."""
+    return (
+        T if period is None else np.maximum(np.ceil(np.asarray(T) / period - PERIOD_ROUNDING), 1.0) * period
+    )

@@ -1,6 +1,6 @@
 """How much of the limits that are no axis' own a motion uses at its samples: for the planner.
 
-The judge has code of its own for each of them (verifier/limits.py, verifier/user_limits.py).
+The judge has code of its own for each of them (verifier/limits.py, verifier/other_limits.py).
 """
 
 from collections.abc import Iterator, Sequence

@@ -8,24 +8,16 @@ on.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
-from planner.motion.trajectory import COLUMNS, Trajectory, joined
+from planner.motion.trajectory import COLUMNS, AnyMotion, Trajectory, joined
 
 CHUNK = SIZES.samples_at_once
-
-
-class _AnyMotion(Protocol):
-    """`MotionInTime` of motion/timing.py, as far as it is used here."""
-
-    @property
-    def end(self) -> float: ...
-
-    def at(self, times: FloatArray, dt: float) -> Trajectory: ...
+_Places = tuple[Array, Array, Array]  # first, block and line (R,) of `at_places`
 
 
 class TrajectoryOnDemand(Trajectory):
@@ -35,7 +27,7 @@ class TrajectoryOnDemand(Trajectory):
         """With the fields of a `Trajectory`, as from `dataclasses.replace`, such a one."""
         return Trajectory(**fields) if "position" in fields else super().__new__(cls)
 
-    def __init__(self, motion: _AnyMotion, dt: float, count: int, places: _Places | None = None):
+    def __init__(self, motion: AnyMotion, dt: float, count: int, places: _Places | None = None):
         first = motion.at(np.zeros(1), dt)
         values: dict[str, Any] = {"axes": first.axes, "radius": first.radius, "dt": dt}
         values |= {"_motion": motion, "_count": count, "_places": places}
@@ -53,7 +45,7 @@ class TrajectoryOnDemand(Trajectory):
 
     def at_places(self, first: Array, block: Array, line: Array) -> TrajectoryOnDemand:
         """The same with other places: sample first[n] is the first of those at block[n], line[n] (R,)."""
-        return TrajectoryOnDemand(self._motion, self.dt, len(self), _Places(first, block, line))
+        return TrajectoryOnDemand(self._motion, self.dt, len(self), (first, block, line))
 
     def heard_by(self, take: Callable[[Trajectory], object]) -> TrajectoryOnDemand:
         """The same; whoever first goes through its chunks lets `take` have them too."""
@@ -79,16 +71,20 @@ class TrajectoryOnDemand(Trajectory):
 
     def rows(self, k: Array) -> Trajectory:
         """The samples with the ascending indices k (n,)."""
-        found = self._motion.at(self._times(k), self.dt)
-        return found if self._places is None else self._places.put_on(found, k)
+        found: Trajectory = self._motion.at(self._times(k), self.dt)
+        if self._places is not None:
+            first, block, line = self._places
+            run = np.searchsorted(first, k, side="right") - 1
+            object.__setattr__(found, "block", block[run])
+            object.__setattr__(found, "line", line[run])
+        return found
 
     def first_not_before(self, times: FloatArray) -> Array:
         """(n,) index of the first sample at or after each of the times (n,) [s]; T where there is none."""
         k = np.clip(np.ceil(np.asarray(times) / self.dt), 0, len(self) - 1).astype(np.int64)
         early = (k > 0) & (self._times(np.maximum(k - 1, 0)) >= times)  # the quotient is rounded
         k = np.where(early, k - 1, k)
-        found: Array = np.where(self._times(k) < times, k + 1, k)
-        return found
+        return np.asarray(np.where(self._times(k) < times, k + 1, k))
 
     def _times(self, k: Array) -> FloatArray:
         times: FloatArray = k * self.dt
@@ -106,8 +102,12 @@ class TrajectoryOnDemand(Trajectory):
 class _Changed:
     """A motion whose samples are changed one by one."""
 
-    def __init__(self, motion: _AnyMotion, change: Callable[[Trajectory], Trajectory]):
+    def __init__(self, motion: AnyMotion, change: Callable[[Trajectory], Trajectory]):
         self.motion, self.change = motion, change
+
+    @property
+    def t(self) -> FloatArray:
+        return self.motion.t
 
     @property
     def end(self) -> float:
@@ -115,17 +115,3 @@ class _Changed:
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         return self.change(self.motion.at(times, dt))
-
-
-class _Places:
-    """Blocks and lines of samples: those from first[n] on are at block[n] and line[n] (R,)."""
-
-    def __init__(self, first: Array, block: Array, line: Array):
-        self.first, self.block, self.line = first, block, line
-
-    def put_on(self, found: Trajectory, k: Array) -> Trajectory:
-        """The samples k (n,) with their blocks and lines."""
-        run = np.searchsorted(self.first, k, side="right") - 1
-        object.__setattr__(found, "block", self.block[run])
-        object.__setattr__(found, "line", self.line[run])
-        return found

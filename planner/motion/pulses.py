@@ -101,9 +101,8 @@ def pulses_of(trajectory: Trajectory, steps: dict[str, float]) -> tuple[AxisPuls
     moves without having a resolution, and for more than `PULSES_MAX` pulses.
     """
     _check(trajectory, steps)
-    return tuple(
-        _axis_pulses(trajectory, k, steps[axis]) for k, axis in enumerate(trajectory.axes) if axis in steps
-    )
+    here = [(k, steps[axis]) for k, axis in enumerate(trajectory.axes) if axis in steps]
+    return tuple(_axis_pulses(trajectory, *each) for each in here)
 
 
 def overrun(trains: tuple[AxisPulses, ...], drive: Drive) -> list[str]:
@@ -156,11 +155,11 @@ def _axis_pulses(trajectory: Trajectory, k: int, steps: float) -> AxisPulses:
     K = _resolution(trajectory.axes[k], steps, trajectory.radius)
     place = K * (trajectory.position[:, k] - trajectory.position[0, k])
     rate = K * trajectory.velocity[:, k]
-    per_period, number = np.zeros(len(trajectory) - 1, np.int64), np.zeros(len(trajectory) - 1, np.int64)
-    time, direction = np.empty(0), np.empty(0, np.int8)
-    total = _count(trajectory.t, place, rate, per_period, number, time, direction)
-    time, direction = np.empty(total), np.empty(total, np.int8)
-    _count(trajectory.t, place, rate, per_period, number, time, direction)
+    per_period, number = np.zeros((2, len(trajectory) - 1), np.int64)
+    total = 0
+    for _ in range(2):  # to count, and to write
+        time, direction = np.empty(total), np.empty(total, np.int8)
+        total = _count(trajectory.t, place, rate, per_period, number, time, direction)
     return AxisPulses(
         axis=trajectory.axes[k],
         steps=steps,
@@ -183,11 +182,8 @@ def _count(t, place, rate, per_period, number, time, direction):
         branches = _monotone(a, b, c, ends)
         for m in range(branches):
             low, high = ends[m], ends[m + 1]
-            up = _value(a, b, c, high) >= _value(a, b, c, low)
-            sign = 1 if up else -1
-            goal = place[k] + _value(a, b, c, high)
-            if m == branches - 1:
-                goal = place[k + 1]
+            sign = 1 if _value(a, b, c, high) >= _value(a, b, c, low) else -1
+            goal = place[k + 1] if m == branches - 1 else place[k] + _value(a, b, c, high)
             while sign * (goal - counter) >= 0.5 + HYSTERESIS:
                 edge = counter + sign * (0.5 + HYSTERESIS) - place[k]
                 low = _crossing(a, b, c, low, high, edge, sign)
@@ -235,10 +231,7 @@ def _crossing(a, b, c, low, high, edge, sign):
     q = 0.5 * (low + high)
     for _ in range(SOLVE_STEPS):
         miss = _value(a, b, c, q) - edge
-        if sign * miss >= 0.0:
-            high = q
-        else:
-            low = q
+        low, high = (low, q) if sign * miss >= 0.0 else (q, high)
         step = miss / (c + q * (2.0 * b + q * 3.0 * a))
         if abs(step) <= TIME_ROUNDING:
             break

@@ -137,27 +137,12 @@ def _invert(table, on, work, out, c):
     a, j = bend[1] - 2.0 * c[2] - 6.0 * c[3], third[1] - 6.0 * c[3]
     c[4], c[5] = 35.0 * p - 15.0 * v + 2.5 * a - j / 6.0, -84.0 * p + 39.0 * v - 7.0 * a + 0.5 * j
     c[6], c[7] = 70.0 * p - 34.0 * v + 6.5 * a - 0.5 * j, -20.0 * p + 10.0 * v - 2.0 * a + j / 6.0
-    off = _off(table, on, out, c, (0.25, 0.5, 0.75))
-    c[0] = max(abs(off[0]), abs(off[1]), abs(off[2]))
-
-
-@njit(cache=True, error_model="numpy")
-def _off(table, on, out, c, shares):
-    """How far the polynomial's arc length is off at three shares of the interval [share of it]; inf where it
-    leaves the interval."""
-    first, second, third = np.inf, np.inf, np.inf
-    for n in range(3):
-        q = shares[n]
-        w, off = on.w0 + (on.w1 - on.w0) * _at(c, q), np.inf
-        if on.w0 <= w <= on.w1:
-            off = _length(table, on, w, out) / on.h - q
-        if n == 0:
-            first = off
-        elif n == 1:
-            second = off
-        else:
-            third = off
-    return first, second, third
+    for quarter in range(1, 4):  # how far its arc length is off there; inf where it leaves the interval
+        q, off = 0.25 * quarter, np.inf
+        w = w0 + dw * _at(c, q)
+        if w0 <= w <= on.w1:
+            off = abs(_length(table, on, w, out) / h - q)
+        c[0] = max(c[0], off)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -189,17 +174,13 @@ def _refine(table, on, work, w, ds, out):
     """Solve for the arc length ds from w0, starting from w: the inverse function's series to second order,
     and halves of what encloses the solution where that leads outside it (where an interval is a whole span it
     may)."""
-    w0, w1, h = on.w0, on.w1, on.h
-    low, high = w0, w1
-    w = min(max(w, w0), w1)
+    low, high, h = on.w0, on.w1, on.h
+    w = min(max(w, low), high)
     for _ in range(REFINE_STEPS):
         miss = _length(table, on, w, out) - ds
         if abs(miss) <= LENGTH_ROUNDING * h:
             break
-        if miss > 0.0:
-            high = w
-        else:
-            low = w
+        low, high = (low, w) if miss > 0.0 else (w, high)
         _point(table, on, work, w, out)
         speed_sq, along = 0.0, 0.0
         for k in range(out.shape[1]):
@@ -229,9 +210,7 @@ def sample(table, law, grid, inverse, times, axes):
     """Position and derivatives (T, A), s and feed (T,) at ascending times, and the toolpath segment (T,) that
     each lies at; an interval of a span may cover several.
 
-    table, grid : `ElementTable` (corners/elements.py), `Grid` (sampling.py)
-    law         : `TimeLaw.columns`
-    inverse     : (P, `COEFFICIENTS`), from `inverses` (sampling.py)
+    table, law, grid, inverse : `ElementTable`, `TimeLaw.columns`, `Grid`, and (P, `COEFFICIENTS`) from `inverses`
     """
     legs, _, spans = table
     t, s_law, feed, acc_s, jerk_s, run, end = law

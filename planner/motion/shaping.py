@@ -103,17 +103,13 @@ class ShapedMotion:
         there = self.motion.at(single, dt)
         which = which.reshape(place.shape)  # NumPy 2.0.0 gave it so, all others flat
         copies, weight = which[:-1], self.shaper.weight
-        means: dict[str, Any] = {
-            name: np.tensordot(weight, getattr(there, name)[copies], axes=1) for name in ("position", "s")
-        }
-        for name in ("velocity", "acceleration", "jerk", "feed"):
-            columns = getattr(there, name)[copies]
-            columns[at_rest[:-1]] = 0.0
-            means[name] = np.tensordot(weight, columns, axes=1)
-        middle = which[-1]
-        return dataclasses.replace(
-            there, t=times, block=there.block[middle], line=there.line[middle], **means
-        )
+        columns: dict[str, Any] = {name: getattr(there, name)[which[-1]] for name in ("block", "line")}
+        for name in ("position", "s", "velocity", "acceleration", "jerk", "feed"):
+            of_copies = getattr(there, name)[copies]
+            if name not in ("position", "s"):
+                of_copies[at_rest[:-1]] = 0.0
+            columns[name] = np.tensordot(weight, of_copies, axes=1)
+        return dataclasses.replace(there, t=times, **columns)
 
     def waiting(self, at: FloatArray, by: FloatArray) -> ShapedMotion:
         """The motion standing longer by `by` (n,) [s] at the times `at` (n,) [s], where all copies rest."""

@@ -30,7 +30,7 @@ Beyond `FAR` reaches nothing is left of phi but rounding.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -211,10 +211,6 @@ class Slowed:
         new = np.stack([without_stands(self.stands, np.sort(at))[0], by[np.argsort(at)]], axis=1)
         stands = np.concatenate([self.stands, new])
         return dataclasses.replace(self, stands=stands[np.argsort(stands[:, 0], kind="stable")])
-
-    def with_places(self, places: Iterable[Place]) -> Slowed:
-        """The motion slower in other places too, and without its stands."""
-        return Slowed(motion=self.motion, places=(*self.places, *places))
 
 
 def times_of_pieces(motion: MotionInTime) -> tuple[FloatArray, float]:

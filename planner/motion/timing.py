@@ -19,7 +19,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -32,7 +32,7 @@ from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.motion.sampling import Grid, inverses, sample
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import COLUMNS, AnyMotion, Trajectory
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -134,24 +134,10 @@ CHUNK = SIZES.times_at_once
 _inverses: WeakKeyDictionary[PathSamples, FloatArray] = WeakKeyDictionary()
 
 
-class MotionInTime(Protocol):
-    """A motion that can be evaluated at any time, in pieces on which everything is smooth."""
+class MotionInTime(AnyMotion, Protocol):
+    """A motion that can stand longer."""
 
-    @property
-    def t(self) -> FloatArray:
-        """(L,) start of each piece [s], non-decreasing."""
-        ...
-
-    @property
-    def end(self) -> float:
-        """End of the last piece [s]."""
-        ...
-
-    def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The motion at ascending times (T,) [s]; `dt` [s] is the trajectory's interpolation period."""
-        ...
-
-    def waiting(self, at: FloatArray, by: FloatArray) -> MotionInTime:
+    def waiting(self, at: FloatArray, by: FloatArray) -> Self:
         """The motion standing longer by `by` (n,) [s] where it rests, at the ends `at` (n,) of pieces [s]."""
         ...
 
@@ -175,7 +161,16 @@ class Motion:
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) [s]."""
-        return _trajectory(self, times, dt)
+        samples, law = self.samples, self.law
+        toolpath, axes = samples.path.toolpath, samples.position.shape[1]
+        fields: dict[str, Array] = {name: getattr(samples, name) for name in Grid._fields[:-1]}
+        grid = Grid(**fields, passed=samples.path.passed)
+        if samples not in _inverses:
+            _inverses[samples] = inverses(samples.table, grid, axes)
+        found = sample(samples.table, law.columns, grid, _inverses[samples], read_only(times), axes)
+        columns = dict(zip(COLUMNS[1:7], found[:-1], strict=True))
+        columns |= {"block": toolpath.block[found[-1]], "line": toolpath.line[found[-1]]}
+        return Trajectory(axes=toolpath.axes, radius=toolpath.radius, dt=dt, t=times, **columns)
 
     def waiting(self, at: FloatArray, by: FloatArray) -> Motion:
         """The motion standing longer by `by` (n,) [s] behind the runs that end nearest to `at` (n,) [s]."""
@@ -192,8 +187,16 @@ class Motion:
 def sample_motion(motion: MotionInTime, dt: float) -> Trajectory:
     """The motion at the interpolation period dt [s], last partial period included; of more samples than
     `SAMPLES_KEPT` they are evaluated when they are asked for."""
-    count, times = _sample_times(motion.end, dt)
-    return TrajectoryOnDemand(motion, dt, count) if times is None else motion.at(times, dt)
+    require_samples(motion.end, dt)
+    count = int(np.floor(motion.end / dt * (1 + 1e-12)))
+    # a remainder below a millionth of dt is rounding and joins the period before
+    if not count or motion.end - count * dt > 1e-6 * dt:
+        count += 1
+    if count + 1 > SAMPLES_KEPT:
+        return TrajectoryOnDemand(motion, dt, count + 1)
+    times: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
+    times[-1] = motion.end
+    return motion.at(times, dt)
 
 
 def inside_pieces(motion: MotionInTime) -> tuple[Array, FloatArray]:
@@ -219,37 +222,3 @@ def require_samples(end: float, dt: float) -> None:
             f"the motion takes {end:.6g} s, {end / dt:.3g} periods of {dt:g} s; at most {SAMPLES_MAX:.0e} samples are made: "
             "raise the feed or the machine's dt, or split the program"
         )
-
-
-def _sample_times(end: float, dt: float) -> tuple[int, FloatArray | None]:
-    """How many samples 0, dt, 2 dt, ..., end are, and their times, None for more than `SAMPLES_KEPT`; a
-    remainder below a millionth of dt is rounding and joins the period before."""
-    require_samples(end, dt)
-    count = int(np.floor(end / dt * (1 + 1e-12)))
-    if not count or end - count * dt > 1e-6 * dt:
-        count += 1
-    if count + 1 > SAMPLES_KEPT:
-        return count + 1, None
-    times: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
-    times[-1] = end
-    return count + 1, times
-
-
-def _trajectory(motion: Motion, times: FloatArray, dt: float) -> Trajectory:
-    samples, law = motion.samples, motion.law
-    toolpath, axes = samples.path.toolpath, samples.position.shape[1]
-    fields: dict[str, Array] = {name: getattr(samples, name) for name in Grid._fields[:-1]}
-    grid = Grid(**fields, passed=samples.path.passed)
-    if samples not in _inverses:
-        _inverses[samples] = inverses(samples.table, grid, axes)
-    *columns, segment = sample(samples.table, law.columns, grid, _inverses[samples], read_only(times), axes)
-    names = ("position", "velocity", "acceleration", "jerk", "s", "feed")
-    return Trajectory(
-        axes=toolpath.axes,
-        radius=toolpath.radius,
-        dt=dt,
-        t=times,
-        block=toolpath.block[segment],
-        line=toolpath.line[segment],
-        **dict(zip(names, columns, strict=True)),
-    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -100,6 +100,24 @@ class Trajectory:
     def first_not_before(self, times: FloatArray) -> Array:
         """(n,) index of the first sample at or after each of the times (n,) [s]; T where there is none."""
         return np.asarray(np.searchsorted(self.t, times))
+
+
+class AnyMotion(Protocol):
+    """A motion that can be asked at any time, in pieces on which everything is smooth."""
+
+    @property
+    def t(self) -> FloatArray:
+        """(L,) start of each piece [s], non-decreasing."""
+        ...
+
+    @property
+    def end(self) -> float:
+        """End of the last piece [s]; the motion begins at 0."""
+        ...
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        """The motion at ascending times (T,) [s]; `dt` [s] is the trajectory's interpolation period."""
+        ...
 
 
 def in_degrees(axes: tuple[str, ...], radius: float) -> FloatArray:

@@ -27,12 +27,9 @@ STANDING = 1e-9
 
 
 def passing_times(motion: Trajectory, toolpath: Toolpath) -> FloatArray:
-    """(M+1,) when the motion passes the joints of a path of M segments [s], non-decreasing.
-
-    motion : sampled so often that between samples it runs straight to within the tolerance
-
-    A motion with as many standstills as full stops passes the joints between two of these between them.
-    """
+    """(M+1,) when a motion passes the joints of a path of M segments [s], non-decreasing; it is sampled so often that
+    between samples it runs straight to within the tolerance. One with as many standstills as full stops passes the
+    joints between two of these between them."""
     stop = np.flatnonzero(toolpath.joint == Joint.STOP)
     begin, end = _standing(motion, toolpath)
     if len(begin) != len(stop) or len(stop) == 2:
@@ -72,11 +69,8 @@ def passing_times_of(chunks: Iterable[Trajectory], toolpath: Toolpath) -> FloatA
 
 
 def standstills(motion: Trajectory, toolpath: Toolpath, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """When the motion comes to rest at the G full stops of a path (G,) [s], and when it leaves them (G,) [s].
-
-    motion : sampled at the ends of its pieces too
-    times  : (M+1,) when it passes the joints, from `passing_times`
-    """
+    """When a motion, sampled at the ends of its pieces too, comes to rest at the G full stops of a path (G,) [s], and when
+    it leaves them (G,) [s]; times (M+1,): from `passing_times`."""
     begin, end = _standing(motion, toolpath)
     count = end - begin + 1
     still = np.repeat(end + 1 - np.cumsum(count), count) + np.arange(count.sum())

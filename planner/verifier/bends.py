@@ -11,7 +11,6 @@ digits; at the nearest point an error of x enters it only squared.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -43,8 +42,7 @@ def curve_points(points: FloatArray, weight: FloatArray, u: FloatArray) -> tuple
     points : (n, 4, A) control points
     weight : (n, 2) of the inner two
     """
-    v = 1.0 - u
-    ones = np.ones(len(u))
+    v, ones = 1.0 - u, np.ones(len(u))
     w = np.stack([ones, weight[:, 0], weight[:, 1], ones], axis=1)
     basis = w * np.stack([v**3, 3 * u * v**2, 3 * u**2 * v, u**3], axis=1)
     slope = w * np.stack([-3 * v**2, 3 * v**2 - 6 * u * v, 6 * u * v - 3 * u**2, 3 * u**2], axis=1)
@@ -70,7 +68,7 @@ def curve_counts(points: FloatArray, weight: FloatArray, angle: float) -> Array:
 
 
 @kernel()
-def reach_bend(pieces: Any, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
+def reach_bend(pieces, i, q, radius):
     """Which part of piece i of `ProgramPieces`, of an arc or a curve, is within `radius` of q (A,), as
     `reach_piece`."""
     x0, x1 = pieces.piece[i]["x0"], pieces.piece[i]["x1"]
@@ -89,7 +87,7 @@ def reach_bend(pieces: Any, i: int, q: FloatArray, radius: float) -> tuple[float
 
 
 @kernel()
-def nearest_on_bend(pieces: Any, i: int, q: FloatArray) -> float:
+def nearest_on_bend(pieces, i, q):
     """The parameter at which piece i, of an arc or a curve, is nearest to q (A,)."""
     x0, x1 = pieces.piece[i]["x0"], pieces.piece[i]["x1"]
     x = _at_polar_angle(pieces, i, q) if pieces.piece[i]["arc"] >= 0 else _nearest_start(pieces, i, q)
@@ -107,7 +105,7 @@ def nearest_on_bend(pieces: Any, i: int, q: FloatArray) -> float:
 
 
 @kernel()
-def _at_polar_angle(pieces: Any, i: int, q: FloatArray) -> float:
+def _at_polar_angle(pieces, i, q):
     k, x0, x1 = pieces.piece[i]["arc"], pieces.piece[i]["x0"], pieces.piece[i]["x1"]
     rate, frame = pieces.turn[k, RATE], pieces.frame
     middle, across, along = 0.5 * (x0 + x1), 0.0, 0.0
@@ -121,7 +119,7 @@ def _at_polar_angle(pieces: Any, i: int, q: FloatArray) -> float:
 
 
 @kernel()
-def _nearest_start(pieces: Any, i: int, q: FloatArray) -> float:
+def _nearest_start(pieces, i, q):
     x0, x1 = pieces.piece[i]["x0"], pieces.piece[i]["x1"]
     x, least = x0, np.inf
     for n in range(STARTS):
@@ -133,7 +131,7 @@ def _nearest_start(pieces: Any, i: int, q: FloatArray) -> float:
 
 
 @kernel()
-def _apart(pieces: Any, i: int, q: FloatArray, x: float) -> tuple[float, float, float]:
+def _apart(pieces, i, q, x):
     """|p(x) - q|^2, g = (p - q).p' and g' of the arc or curve of piece i."""
     arc = pieces.piece[i]["arc"] >= 0
     distance_sq, g, slope = 0.0, 0.0, 0.0
@@ -147,7 +145,7 @@ def _apart(pieces: Any, i: int, q: FloatArray, x: float) -> tuple[float, float, 
 
 
 @kernel()
-def _on_arc(pieces: Any, i: int, x: float, n: int) -> tuple[float, float, float]:
+def _on_arc(pieces, i, x, n):
     """Coordinate n of the arc of piece i at x, and its first two derivatives."""
     k, frame = pieces.piece[i]["arc"], pieces.frame
     radius, rate = pieces.turn[k, RADIUS], pieces.turn[k, RATE]
@@ -159,16 +157,12 @@ def _on_arc(pieces: Any, i: int, x: float, n: int) -> tuple[float, float, float]
 
 
 @kernel()
-def _on_curve(pieces: Any, i: int, u: float, n: int) -> tuple[float, float, float]:
+def _on_curve(pieces, i, u, n):
     """Coordinate n of the curve of piece i at u, and its first two derivatives."""
     k = -2 - pieces.piece[i]["arc"]
     w1, w2, v = pieces.turn[k, 0], pieces.turn[k, 1], 1.0 - u
-    p0, p1, p2, p3 = (
-        pieces.frame[k, 0, n],
-        pieces.frame[k, 1, n],
-        pieces.frame[k, 2, n],
-        pieces.frame[k, 3, n],
-    )
+    p0, p1 = pieces.frame[k, 0, n], pieces.frame[k, 1, n]
+    p2, p3 = pieces.frame[k, 2, n], pieces.frame[k, 3, n]
     b0, b1, b2, b3 = v * v * v, 3.0 * w1 * u * v * v, 3.0 * w2 * u * u * v, u * u * u
     s0, s1 = -3.0 * v * v, 3.0 * w1 * v * (v - 2.0 * u)
     s2, s3 = 3.0 * w2 * u * (2.0 * v - u), 3.0 * u * u
@@ -181,9 +175,8 @@ def _on_curve(pieces: Any, i: int, u: float, n: int) -> tuple[float, float, floa
 
 
 @kernel()
-def apart_on_bend(pieces: Any, i: int, q: FloatArray, counts: Array) -> float:
-    """Squared distance of q (A,) from its nearest point on piece i, an arc or a curve, in axes that `counts`
-    (A,)."""
+def apart_on_bend(pieces, i, q, counts):
+    """Squared distance of q (A,) from its nearest point on piece i, an arc or a curve, in axes that `counts` (A,)."""
     x, apart_sq = nearest_on_bend(pieces, i, q), 0.0
     arc = pieces.piece[i]["arc"] >= 0
     for n in range(len(q)):

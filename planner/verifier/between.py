@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.verifier.kernel import kernel
-from planner.verifier.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, STRAIGHT, ProgramPieces
+from planner.verifier.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, STRAIGHT
 
 ROUNDING = 1e-7  # by which places of one cubic may disagree, of the limits of velocity and acceleration [-]
 PARTS = 32  # of the time between two places, where speed has a maximum: its ordinates are then good to 1/1000 of what they were
@@ -41,27 +41,8 @@ class Between(NamedTuple):
     cut: FloatArray
 
 
-def nothing_between(places: int, axes: int) -> Between:
-    """To be filled by `look_between`."""
-    return Between(
-        np.zeros((places, axes)), np.zeros((places, axes)), np.zeros(places), np.full(places, np.nan)
-    )
-
-
 @kernel()
-def look_between(
-    t: FloatArray,
-    state: FloatArray,
-    edges: FloatArray,
-    edge: int,
-    limits: FloatArray,
-    skip: int,
-    pieces: ProgramPieces,
-    piece: Array,
-    work: FloatArray,
-    found: Between,
-    known: FloatArray,
-) -> None:
+def look_between(t, state, edges, edge, limits, skip, pieces, piece, work, found, known):
     """Into `found` what lies before the places `skip` and later, and into `known` (3,) how much is left open.
 
     t       : (n,) [s]

@@ -13,6 +13,7 @@ near to two vertices in the wrong order, which is a fault (findings.out_of_order
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -42,13 +43,11 @@ class Apart:
         """The motion stays within these budgets, or half of those that were widened, as far as it goes."""
         share = self.widened if self.widened == 1.0 else 0.5 * self.widened
         return all(
-            reading.match.tally[LOST_AFTER] == NOT_LOST
-            and not reading.match.tally[JUMPS]
-            and reading.match.worst[0] <= share / self.widened * (1.0 + 2.0 * RATIO_ROUNDING)
-            and not (reading.match.passed["near"] > share * self._allowed)[
-                : reading.match.tally[LAST] + 1
-            ].any()
-            for reading in self.readings
+            match.tally[LOST_AFTER] == NOT_LOST
+            and not match.tally[JUMPS]
+            and match.worst[0] <= share / self.widened * (1.0 + 2.0 * RATIO_ROUNDING)
+            and not (match.passed["near"] > share * self._allowed)[: match.tally[LAST] + 1].any()
+            for match in (reading.match for reading in self.readings)
         )
 
     @property
@@ -69,17 +68,9 @@ class Apart:
         ratio, budget = ratio * self.widened, budget / self.widened
         if distance <= budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING:
             ratio = min(ratio, 1.0)  # within the rounding of the matching, which is absolute too
-        return LimitCheck(
-            name="contour",
-            unit="mm",
-            ratio=float(ratio),
-            value=float(distance),
-            limit=float(budget) if budget > 0 else float(self.pieces.piece["budget"].min()),
-            time=float(time),
-            position=reading.match.place[WORST_AT],
-            line=line_of(toolpath, self.pieces, int(piece)),
-            note=reading.note,
-        )
+        limit = budget if budget > 0 else self.pieces.piece["budget"].min()
+        place, line = reading.match.place[WORST_AT], line_of(toolpath, self.pieces, int(piece))
+        return _check("contour", (ratio, distance, limit, time), place, line, reading.note)
 
     # ---- the vertices from the motion
 
@@ -105,16 +96,9 @@ class Apart:
         ratio = near[i] / budgets[i]
         if near[i] <= self._allowed[i]:
             ratio = min(ratio, 1.0)
-        return LimitCheck(
-            name="vertex",
-            unit="mm",
-            ratio=float(ratio),
-            value=float(near[i]),
-            limit=float(budgets[i]),
-            time=float(reading.match.passed["near_time"][i]),
-            position=self.pieces.vertex[i],
-            line=line_of(toolpath, self.pieces, i - 1),
-            note=reading.note,
+        found = ratio, near[i], budgets[i], reading.match.passed["near_time"][i]
+        return _check(
+            "vertex", found, self.pieces.vertex[i], line_of(toolpath, self.pieces, i - 1), reading.note
         )
 
     def vertex_faults(self, toolpath: Toolpath) -> list[Fault]:
@@ -141,8 +125,7 @@ class Apart:
 
     def excesses(self) -> list[Excess]:
         """Where the motion leaves the tolerance: the worst place of each reading, and all vertices whose
-        distance is known. Of what the chords between samples add a slower motion has less; what is between
-        the samples is the path's own error."""
+        distance is known. A slower motion has less of what the chords between samples add to the path's own error."""
         found = []
         for k, reading in enumerate(self.readings):
             ratio, distance, budget, time, _, _ = reading.match.worst.tolist()
@@ -156,6 +139,12 @@ class Apart:
                 still = own if len(self.readings) > 1 and np.isfinite(own) else 0.0
                 found.append(of_place(Kind.VERTEX, float(times[i]), by, 2, still))
         return found
+
+
+def _check(name: str, found: tuple[float, ...], place: FloatArray, line: int, note: str) -> LimitCheck:
+    ratio, value, limit, time = map(float, found)
+    where: dict[str, Any] = {"time": time, "position": place, "line": line, "note": note}
+    return LimitCheck(name=name, unit="mm", ratio=ratio, value=value, limit=limit, **where)
 
 
 def apart(

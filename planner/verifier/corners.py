@@ -26,40 +26,30 @@ class CornerCheck:
     """One row per programmed corner, in order: a joint that turns and at which the program does not stop.
 
     All but line, position, theta, budget and feed_paper is NaN where the motion was not looked at.
-
-    line             : (C,) source line of the block that ends there
-    position         : (C, A) the programmed vertex [mm]
-    theta            : (C,) turning angle [rad]
-    budget           : (C,) eps [mm]
-    time             : (C,) when the motion is nearest to the vertex [s]
-    feed_planned     : (C,) its speed there [mm/s]
-    feed_closed_form : (C,) sqrt(A(n)/kappa), eq. (19) with the motion's own curvature [mm/s]; inf if straight
-    feed_paper       : (C,) eq. (20)'s speed of paper 002's own corner between long straight legs [mm/s]
-    feed_programmed  : (C,) the smaller one of the two blocks [mm/s]
-    speed_ratio      : (C,) largest feed_planned / feed_closed_form of all readings of the motion [-]
-    miss             : (C,) distance of the vertex from the motion [mm]; of samples alone from their chords
-    chord_error      : (C,) kappa feed^2 dt^2 / 8 [mm]; 0 where `miss` contains it
-    budget_ratio     : (C,) the larger of miss + chord_error and the delivered chords' distance, over eps [-]
-    delivered_speed, delivered_budget : (C,) both ratios by the samples and their chords alone [-]
-    judged           : False if the limit behind eq. (19) is reported only
     """
 
-    line: Array
-    position: FloatArray
-    theta: FloatArray
-    budget: FloatArray
-    time: FloatArray
-    feed_planned: FloatArray
-    feed_closed_form: FloatArray
-    feed_paper: FloatArray
-    feed_programmed: FloatArray
-    speed_ratio: FloatArray
-    miss: FloatArray
-    chord_error: FloatArray
-    budget_ratio: FloatArray
-    delivered_speed: FloatArray
+    line: Array  # (C,) source line of the block that ends there
+    position: FloatArray  # (C, A) the programmed vertex [mm]
+    theta: FloatArray  # (C,) turning angle [rad]
+    budget: FloatArray  # (C,) eps [mm]
+    time: FloatArray  # (C,) when the motion is nearest to the vertex [s]
+    feed_planned: FloatArray  # (C,) its speed there [mm/s]
+    feed_closed_form: (
+        FloatArray  # (C,) sqrt(A(n)/kappa), eq. (19) with the motion's own curvature [mm/s]; inf if straight
+    )
+    feed_paper: (
+        FloatArray  # (C,) eq. (20)'s speed of paper 002's own corner between long straight legs [mm/s]
+    )
+    feed_programmed: FloatArray  # (C,) the smaller one of the two blocks [mm/s]
+    speed_ratio: FloatArray  # (C,) largest feed_planned / feed_closed_form of all readings of the motion [-]
+    miss: FloatArray  # (C,) distance of the vertex from the motion [mm]; of samples alone from their chords
+    chord_error: FloatArray  # (C,) kappa feed^2 dt^2 / 8 [mm]; 0 where `miss` contains it
+    budget_ratio: (
+        FloatArray  # (C,) the larger of miss + chord_error and the delivered chords' distance, over eps [-]
+    )
+    delivered_speed: FloatArray  # (C,) both ratios by the samples and their chords alone [-]
     delivered_budget: FloatArray
-    judged: bool = True
+    judged: bool = True  # False if the limit behind eq. (19) is reported only
 
     def __post_init__(self) -> None:
         corners = len(self.line)
@@ -106,12 +96,7 @@ class CornerCheck:
     def stands(self) -> Array:
         """(C,) True where the motion stops, or next to it (`STANDS`); not where the path turns back."""
         stops = self.feed_planned < STANDS * np.minimum(self.feed_paper, self.feed_programmed)
-        return self._turns & stops
-
-    @property
-    def _turns(self) -> Array:
-        """(C,) True where the motion was looked at, and the path does not turn back."""
-        return self.looked & (self.theta <= CUSP)
+        return self.looked & (self.theta <= CUSP) & stops
 
     @property
     def gain(self) -> FloatArray:
@@ -121,7 +106,8 @@ class CornerCheck:
     @property
     def compared(self) -> Array:
         """(C,) True where the gain tells something: the corner is run through, eq. (20) below the feed."""
-        return self._turns & ~self.stands & (self.feed_paper < self.feed_programmed)
+        turns = self.looked & (self.theta <= CUSP)
+        return turns & ~self.stands & (self.feed_paper < self.feed_programmed)
 
     def told(self) -> tuple[FloatArray, FloatArray]:
         """(C,) ratios of eq. (19) and (18) for people: as delivered, so that a plan and the verdict on its

@@ -11,11 +11,9 @@ own curvature, all over the linear axes.
     feed / sqrt(A(n)/kappa) = sqrt( |a_n| / A(n) ) <= 1.
 
 Proof: n is a unit vector along a_n, so |a_n| = a_n.n = a.n (t.n = 0) = sum_k a_k(t) n_k <= sum_k a_k |n_k|
-for every acceleration within the axes' limits; and |a_n| <= A_max is the other limit itself. Nothing else was
-used: it holds for every method, corner, path and direction t, so that errors of the velocity cannot break it.
-The sum is attained where every axis gives all it has, so the bound cannot be smaller for all motions; and a
-motion that takes a corner of curvature kappa as if nothing limited the acceleration exceeds it as soon as
-kappa feed^2 > A(n).
+for every acceleration within the axes' limits; and |a_n| <= A_max is the other limit itself. It holds for every
+method, corner, path and direction t, so that errors of the velocity cannot break it, and it is attained where every axis
+gives all it has.
 
 **Eq. (18), the budget.** Let the motion pass the vertex at the distance d from it. What drives are given are
 samples: over a period dt the chord bows from the motion by c a, c <= dt^2/8, wherever the samples fall (to second
@@ -40,8 +38,8 @@ the motion gains over it. It is no bound: other shapes within eps may be faster,
 turn at each of their corners.
 """
 
-from dataclasses import dataclass, replace
 from functools import partial, reduce
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,14 +47,13 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import LINEAR_AXES, Machine
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import AnyMotion, Trajectory
 from planner.verifier.corners import CornerCheck
 from planner.verifier.excess import Excess, Fault, Kind, first_of, of_place, placed
 from planner.verifier.filtered import bow_share
 from planner.verifier.limits import ACCELERATION, FEED_AT_REST, normal_limit
 from planner.verifier.matching import NEAR_MISS
 from planner.verifier.pieces import ProgramPieces
-from planner.verifier.reading import AnyMotion
 from planner.verifier.stream import Observed
 from planner.verifier.worst import ROUNDING_ULPS, Limits
 
@@ -67,8 +64,7 @@ TIMES, CLOSER = 17, 4
 AT_ONCE = SIZES.corners_at_once
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Reading:
+class _Reading(NamedTuple):
     """The motion near C vertices: time [s], speed [mm/s], |a_n|, A(n) [mm/s2], distance [mm]."""
 
     time: FloatArray
@@ -95,7 +91,6 @@ def check_corners(
 ) -> CornerCheck:
     """Hold the motion against eq. (18)-(20) at every corner of the program.
 
-    readings : of the samples and, where there is one, of the motion between them; with the times of vertices
     motion : what the samples were taken from; None to look at the samples alone
     limits : what accelerations that were derived from positions can be off by
     judged : False if the limit of acceleration is reported only
@@ -131,27 +126,23 @@ def check_corners(
         budget_ratio = np.maximum(budget_ratio, together / eps)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.where(reading.normal > 0, reading.feed * np.sqrt(reading.allowed / reading.normal), np.inf)
-
-    def known(values: FloatArray) -> FloatArray:
-        return np.where(looked, values, np.nan)
-
+    seen = {
+        "time": reading.time,
+        "feed_planned": reading.feed,
+        "feed_closed_form": own,
+        "speed_ratio": speed_ratio,
+    }
+    seen |= {"miss": miss, "chord_error": chord, "budget_ratio": budget_ratio}
+    seen |= {"delivered_speed": delivered[0], "delivered_budget": delivered[1]}
     return CornerCheck(
         line=toolpath.line[corner - 1],
         position=vertex,
         theta=toolpath.theta[corner],
         budget=eps,
-        time=known(reading.time),
-        feed_planned=known(reading.feed),
-        feed_closed_form=known(own),
         feed_paper=_paper_speed(toolpath, corner, machine),
         feed_programmed=np.minimum(toolpath.feed[corner - 1], toolpath.feed[corner]),
-        speed_ratio=known(speed_ratio),
-        miss=known(miss),
-        chord_error=known(chord),
-        budget_ratio=known(budget_ratio),
-        delivered_speed=known(delivered[0]),
-        delivered_budget=known(delivered[1]),
         judged=judged,
+        **{name: np.where(looked, values, np.nan) for name, values in seen.items()},
     )
 
 
@@ -185,8 +176,8 @@ def _kinds(check: CornerCheck) -> tuple[tuple[Kind, Array, FloatArray, int, Floa
 def _fault(check: CornerCheck, ratios: FloatArray, kind: Kind, axes: tuple[str, ...], k: int) -> Fault:
     line, time, ratio = int(check.line[k]), float(check.time[k]), float(ratios[k])
     if kind is Kind.CORNER_SPEED:
-        said = f"passed at {check.feed_planned[k]:.6g} mm/s, {ratio:.7g} of what the axes' acceleration leaves a motion of its "
-        said += "curvature"
+        said = f"passed at {check.feed_planned[k]:.6g} mm/s, {ratio:.7g} of what the axes' acceleration leaves a motion of "
+        said += "its curvature"
     else:
         budget = check.budget[k]
         said = f"missed by {ratio * budget:.7g} mm with the chord error, {ratio:.7g} of the budget {budget:.6g} mm"
@@ -214,7 +205,7 @@ def _nearest_sample(
     if not limits.judged[ACCELERATION]:
         ulp = ROUNDING_ULPS * 2.0**-52 * np.abs(near.position[k]).max(axis=1, initial=0.0)
         rounding = np.linalg.norm(limits.rounding) + ulp + limits.time_rounding * there.feed
-        there = replace(there, normal=np.maximum(there.normal - 4.0 * rounding / period**2, 0.0))
+        there = there._replace(normal=np.maximum(there.normal - 4.0 * rounding / period**2, 0.0))
     return there, period
 
 
@@ -239,20 +230,16 @@ def _least_miss(
 ) -> FloatArray:
     """(C,) the least distance [mm] at which chords pass the vertices (C, A) near the times `nearest` (C,) [s] of the motion's
     nearest points, up to a period away; bow: dt^2/8 [s2]."""
-
-    def seen(times: FloatArray) -> tuple[FloatArray, FloatArray]:
-        unique, row = np.unique(np.clip(times.ravel(), 0.0, motion.end), return_inverse=True)
-        there = motion.at(unique, period)
-        off = there.position[row].reshape(*times.shape, -1) - vertex[:, None]
-        chord = off + bow * there.acceleration[row].reshape(off.shape)
-        return np.linalg.norm(off, axis=-1), np.linalg.norm(chord, axis=-1)
-
     if not len(nearest):
         return nearest
     least: FloatArray = np.full(len(nearest), np.inf)
     for width in period * (2.0 / (TIMES - 1)) ** np.arange(1 + CLOSER):
         times = nearest[:, None] + width * np.linspace(-1.0, 1.0, TIMES)
-        apart = np.maximum(*seen(times))
+        unique, row = np.unique(np.clip(times.ravel(), 0.0, motion.end), return_inverse=True)
+        there = motion.at(unique, period)
+        off = there.position[row].reshape(*times.shape, -1) - vertex[:, None]
+        chord = off + bow * there.acceleration[row].reshape(off.shape)
+        apart = np.maximum(*(np.linalg.norm(way, axis=-1) for way in (off, chord)))
         best = apart.argmin(axis=1)[:, None]
         nearest = np.take_along_axis(times, best, 1)[:, 0]
         least = np.minimum(least, np.take_along_axis(apart, best, 1)[:, 0])
@@ -260,14 +247,11 @@ def _least_miss(
 
 
 def _joined(readings: list[_Reading]) -> _Reading:
-    return _Reading(
-        **{name: np.concatenate([getattr(one, name) for one in readings]) for name in vars(readings[0])}
-    )
+    return _Reading(*map(np.concatenate, zip(*readings, strict=True)))
 
 
 def _nearer(a: _Reading, b: _Reading) -> _Reading:
-    first = a.distance < b.distance
-    return _Reading(**{name: np.where(first, getattr(a, name), getattr(b, name)) for name in vars(a)})
+    return _Reading(*(np.where(a.distance < b.distance, *both) for both in zip(a, b, strict=True)))
 
 
 def _read(motion: Trajectory, rows: Array, distance: FloatArray, machine: Machine) -> _Reading:

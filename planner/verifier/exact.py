@@ -14,10 +14,7 @@ block out or is not at its end, is lost. What stays within a h^2 / 8 of one plac
 samples; that it is left out is not seen.
 
 The tolerance stays the budget of blocks under G64, and of the half of a block that is beside one without a
-full stop between: the corner there may be rounded.
-
-How far a motion that is lost was off is measured within the tolerance: from the nearest of the pieces that it
-can be on, in order.
+full stop between: the corner there may be rounded. How far a motion that is lost was off is measured within it.
 """
 
 from collections.abc import Iterator
@@ -92,8 +89,7 @@ def _positions(trajectory: Trajectory) -> Iterator[tuple[FloatArray, FloatArray]
     """Times and positions of the samples, some at a time."""
     for chunk in trajectory.chunks():
         for low in range(0, len(chunk), BLOCK_SAMPLES):
-            part = slice(low, low + BLOCK_SAMPLES)
-            yield chunk.t[part], chunk.position[part]
+            yield chunk.t[low : low + BLOCK_SAMPLES], chunk.position[low : low + BLOCK_SAMPLES]
 
 
 def _beside(toolpath: Toolpath) -> Array:
@@ -117,10 +113,8 @@ def _exact_pieces(toolpath: Toolpath, pieces: ProgramPieces) -> Array:
 
 
 def _tightened(pieces: ProgramPieces, exact: Array, bow: float) -> ProgramPieces:
-    """The pieces with the budgets of the module's text on `exact` (N,) ones, and at their end vertices.
-
-    bow : largest distance of a motion from its chord [mm]; inf or NaN where acceleration is not judged
-    """
+    """The pieces with the budgets of the module's text on `exact` (N,) ones, and at their end vertices; bow: largest
+    distance of a motion from its chord [mm], inf or NaN where acceleration is not judged."""
     piece, joint = pieces.piece.copy(), pieces.joint.copy()
     piece["budget"][exact] = PLACE_ROUNDING
     at_end = np.append(exact, False) | np.append(False, exact)

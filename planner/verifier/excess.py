@@ -116,17 +116,8 @@ class Spans:
     end: list[float] = field(default_factory=list)
     ratio: list[float] = field(default_factory=list)
 
-    def take(self, t: FloatArray, over: FloatArray) -> None:
-        """The spans of samples at t (n,) [s] with ratios `over` (n, columns), 0 where nothing is exceeded."""
-        for column in np.flatnonzero(over.any(axis=0)).tolist():
-            self.add(column, t, over[:, column])
-
     def add(self, column: int, t: FloatArray, over: FloatArray) -> None:
-        """The same of one quantity.
-
-        t    : (n,) [s]
-        over : (n,) the ratios, of which some are above 0 [-]
-        """
+        """The spans of a quantity in samples at t (n,) [s] with ratios `over` (n,) [-], 0 where nothing is exceeded."""
         at = np.flatnonzero(over)
         first = np.flatnonzero(np.diff(at, prepend=-APART - 1) > APART)
         last = np.append(first[1:], len(at)) - 1

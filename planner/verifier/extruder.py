@@ -11,11 +11,10 @@ acceleration, jerk      while the axes move, those along the path times the rati
 place         when a joint is passed E is what the program says, but for what the ratio makes of `NEAR` tolerances and of one period at
               the speed there; in the end it is that to rounding.
 
-Rounding is taken off: `ROUNDING_ULPS` units in the last place of E, and the digits that a file was written
-with.
+Rounding is taken off: `ROUNDING_ULPS` units in the last place of E, and the digits that a file was written with.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,12 +22,12 @@ from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, Kind, first_of
-from planner.verifier.findings import check_of, joint_times
+from planner.verifier.findings import check_of
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import FEED_AT_REST, UNITS
-from planner.verifier.pieces import RATIO_ROUNDING, ProgramPieces
-from planner.verifier.stream import Observed, overlapping
-from planner.verifier.user_limits import along_path
+from planner.verifier.other_limits import along_path
+from planner.verifier.pieces import RATIO_ROUNDING
+from planner.verifier.stream import overlapping
 from planner.verifier.verdict import LimitCheck
 from planner.verifier.worst import (
     COLUMN,
@@ -46,32 +45,21 @@ PLACE_ROUNDING = 1e-6  # of E [mm of filament]: the digits that programs carry
 CARRIED = 4  # samples that a chunk shares with the one before
 
 
-@dataclass(frozen=True, eq=False)
-class ExtruderSeen:
-    """The extruder's checks: those of its limits by name, faults of its place, and notes."""
-
-    checks: dict[str, LimitCheck] = field(default_factory=dict)
-    faults: tuple[Fault, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
 def extruder_seen(
-    trajectory: Trajectory,
-    readings: list[Observed],
-    toolpath: Toolpath,
-    pieces: ProgramPieces,
-    given: Given,
-    not_limited: tuple[str, ...],
-) -> ExtruderSeen:
-    """The checks of the extruder of a delivered motion; nothing where the program has none."""
+    trajectory: Trajectory, passed: FloatArray, toolpath: Toolpath, given: Given, not_limited: tuple[str, ...]
+) -> tuple[dict[str, LimitCheck], list[Fault], list[str]]:
+    """The checks of the extruder's limits by name, faults of its place, and notes; nothing where the program has none.
+
+    passed : (M+1,) times at which the motion passes the joints of the path [s]
+    """
     if toolpath.extrusion is None:
-        return ExtruderSeen()
-    watch = _Watch(toolpath, joint_times(readings[0], pieces), given)
+        return {}, [], []
+    watch = _Watch(toolpath, passed, given)
     for chunk in overlapping(trajectory, CARRIED):
         if not len(chunk.extruder):
-            return ExtruderSeen(notes=("there is no column e: what the extruder does is not judged",))
+            return {}, [], ["there is no column e: what the extruder does is not judged"]
         watch.take(chunk)
-    return ExtruderSeen(watch.checks(not_limited), tuple(watch.place_faults()))
+    return watch.checks(not_limited), watch.place_faults(), []
 
 
 class _Watch:
@@ -112,18 +100,13 @@ class _Watch:
             if order:  # acceleration and jerk of the extruder while the axes rest
                 still[1:] &= still[:-1]
                 self._keep(order, np.where(still, less_error(seen)[:, 0], 0.0), block)
-        self._places(t, e, speed)
-
-    def _places(self, t: FloatArray, e: FloatArray, speed: FloatArray) -> None:
-        """E where the joints are passed, as far as the samples go."""
-        when = self.passed[self.fed.joint]
+        when = self.passed[self.fed.joint]  # joints that are passed, as far as the samples go
         here = np.flatnonzero((when >= t[0]) & (when <= t[-1]))
         self.seen[here] = np.interp(when[here], t, e)
         self.speed[here] = np.interp(when[here], t, speed)
 
     def _keep(self, row: int, value: FloatArray, block: SampleBlock) -> None:
-        assert self.toolpath.extrusion is not None
-        self.worst.take(row, value[:, None], self.toolpath.extrusion.limits[row], COLUMN, block)
+        self.worst.take(row, value[:, None], self.fed.limits[row], COLUMN, block)
 
     def checks(self, not_limited: tuple[str, ...]) -> dict[str, LimitCheck]:
         """The worst of its limits, by name."""

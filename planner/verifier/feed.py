@@ -17,7 +17,6 @@ Where a block begins and ends to within `reach` (nearest.py), both are meant, an
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
 from planner.verifier.excess import NAMES
 from planner.verifier.kernel import kernel
 from planner.verifier.passing import JUDGED, OPEN, SURE, Bounds, Chords
@@ -85,18 +84,7 @@ class Feeds:
 
 
 @kernel()
-def _judged(
-    pieces: ProgramPieces,
-    groups: Array,
-    switch: Array,
-    known: int,
-    block: Array,
-    chords: Chords,
-    until: float,
-    worst: FloatArray,
-    sample: Array,
-    over: FloatArray,
-) -> int:
+def _judged(pieces, groups, switch, known, block, chords, until, worst, sample, over):
     """Judge the chords that end at the place `until` at the latest, into `worst` (4,), `sample` (1,) and
     `over` (n,); vertices before `known` are settled. -> the first one that is left
 

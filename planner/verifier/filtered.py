@@ -16,14 +16,9 @@ v/T1, a setpoint that jumps by d makes a jump d/T1 of the first derivative, and 
 nanometres, and with "hold" on the way of the motion (measured in tests/verifier/test_filtered.py). The
 integrals begin anew in every chunk: no digit is lost in long motions.
 
-The filtered motion is matched with the path like any other (matching.py): contour, vertices, order. Limits
-are judged on the setpoints: a mean never exceeds what it is the mean of. A full stop is a vertex like any
-other: the filtered motion need not rest there.
-
-Nothing but the setpoints is looked at, whether or not the motion that they were taken from can be asked: the
-verdict of a plan and that on its file have the same numbers here.
-
-What the machine does between two setpoints, as the judge sees it: the signal that its filters get.
+The filtered motion is matched with the path like any other (matching.py); a full stop is a vertex, at which it need
+not rest. Limits are judged on the setpoints: a mean never exceeds what it is the mean of. Nothing else is looked at, so
+that the verdict of a plan and that on its file have the same numbers here.
 
 With setpoints p0 and p1 at the ends of a period h, velocities v0 and v1, and its share w,
 
@@ -37,7 +32,6 @@ velocity was not delivered, it is what whoever read the positions derived from t
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -77,9 +71,8 @@ def filtered(
     for first in range(0, count, CHUNK):
         t = h * np.arange(first - before, min(first + CHUNK, count), dtype=np.float64)
         signal.take(float(t[0]) - first_of_all, float(t[-1]))
-        late, early = signal.at(t), signal.at(t - first_of_all)
-        origin = late.origin
-        x, v = (late.area - early.area) / first_of_all, (late.place - early.place) / first_of_all
+        (late, late_area, origin), (early, early_area, _) = signal.at(t), signal.at(t - first_of_all)
+        x, v = (late_area - early_area) / first_of_all, (late - early) / first_of_all
         for T in others:
             x, v = _mean(x, v, h, T)
         yield t[before:], x + origin
@@ -146,20 +139,12 @@ def bow_share(machine: Machine | None = None) -> float:
     return CUBIC_BOW if machine is not None and machine.interpolation == "cubic" else CHORD_BOW
 
 
-class At(NamedTuple):
-    """The signal at T times."""
-
-    place: FloatArray  # (T, A) less the origin [mm]
-    area: FloatArray  # (T, A) integral of that from the first setpoint kept [mm s]
-    origin: FloatArray  # (A,) [mm]
-
-
 class Signal:
     """The signal of setpoints, chunk by chunk; only what is asked for next is kept."""
 
     def __init__(self, trajectory: Trajectory, interpolation: str):
         self._chunks = trajectory.chunks()
-        self._of = {"linear": _linear, "cubic": _cubic, "hold": _hold}[interpolation]
+        self._interpolation = interpolation
         self._begin = np.nan
         self._t, self._p, self._v = np.empty(0), np.empty((0, 0)), np.empty((0, 0))
         self._areas = np.empty((0, 0))
@@ -180,38 +165,29 @@ class Signal:
         _, areas = self._between(k, np.ones(len(k)))
         self._areas = np.concatenate([np.zeros((1, self._p.shape[1])), np.cumsum(areas, axis=0)])
 
-    def at(self, times: FloatArray) -> At:
-        """The signal at ascending times (T,) [s] of those that were taken."""
+    def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """At ascending times (T,) [s] of those that were taken the signal less an origin (T, A) [mm], its integral from
+        the first setpoint kept (T, A) [mm s], and the origin (A,) [mm]."""
         t, origin = self._t, self._p[0]
         k = np.clip(np.searchsorted(t, times, side="right") - 1, 0, max(len(t) - 2, 0))
         inside = np.clip(times, t[0], t[-1])
         beyond = (times - inside)[:, None]
         if len(t) < 2:
-            return At(np.zeros((len(times), len(origin))), np.zeros((len(times), len(origin))), origin)
+            return (*np.zeros((2, len(times), len(origin))), origin)
         place, part = self._between(k, (inside - t[k]) / (t[k + 1] - t[k]))
         ended = times >= t[-1]
         place[ended] = self._p[-1] - origin
-        return At(place, self._areas[k] + part + beyond * place, origin)
+        return place, self._areas[k] + part + beyond * place, origin
 
     def _between(self, k: Array, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Places (n, A) at the shares w (n,) of the periods k (n,), less the origin, and their integrals."""
         h = (self._t[k + 1] - self._t[k])[:, None]
         p0, p1 = self._p[k] - self._p[0], self._p[k + 1] - self._p[0]
-        place, area = self._of(w[:, None], p0, p1 - p0, h * self._v[k], h * self._v[k + 1])
-        return place, h * area
-
-
-Pair = tuple[FloatArray, FloatArray]
-
-
-def _linear(w: FloatArray, p: FloatArray, c: FloatArray, b: FloatArray, d: FloatArray) -> Pair:
-    return p + w * c, w * (p + w * c / 2)
-
-
-def _cubic(w: FloatArray, p: FloatArray, c: FloatArray, b: FloatArray, d: FloatArray) -> Pair:
-    square, cube = 3 * c - 2 * b - d, b + d - 2 * c
-    return p + w * (b + w * (square + w * cube)), w * (p + w * (b / 2 + w * (square / 3 + w * cube / 4)))
-
-
-def _hold(w: FloatArray, p: FloatArray, c: FloatArray, b: FloatArray, d: FloatArray) -> Pair:
-    return np.broadcast_to(p, np.broadcast_shapes(w.shape, p.shape)).copy(), w * p
+        w, c, b, d = w[:, None], p1 - p0, h * self._v[k], h * self._v[k + 1]
+        if self._interpolation == "hold":
+            return p0, h * (w * p0)
+        if self._interpolation == "linear":
+            return p0 + w * c, h * (w * (p0 + w * c / 2))
+        square, cube = 3 * c - 2 * b - d, b + d - 2 * c
+        place, area = b + w * (square + w * cube), p0 + w * (b / 2 + w * (square / 3 + w * cube / 4))
+        return p0 + w * place, h * (w * area)

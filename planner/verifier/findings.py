@@ -1,6 +1,7 @@
 """From what the readings of a motion showed to checks and to faults in sentences."""
 
 import itertools
+from functools import partial
 
 import numpy as np
 
@@ -21,14 +22,9 @@ STOP_ROUNDING = 1e-3
 
 
 def joint_times(reading: Observed, pieces: ProgramPieces) -> FloatArray:
-    """(M+1,) times at which the motion passes the joints of M segments [s], in order: each when it is
-    nearest, and no earlier than the joint before. That of a joint that is not reached is that of the last one
-    before that is: its own is 0.
-
-    A late time hides no fault: a joint is compared with the chords run while the piece before it is possible,
-    so that its time reaches only as far as the motion stays, in order, within the tolerance of that piece;
-    the joints behind that it delays were passed within it. An error of the tolerance is allowed there anyway.
-    """
+    """(M+1,) times at which the motion passes the joints of M segments [s], in order: each when it is nearest, and no
+    earlier than the joint before, the time of one that is not reached. A late time hides no fault: a joint is compared
+    with the chords run while the piece before it is possible, within the tolerance of that piece."""
     near: FloatArray = reading.match.passed["near_time"][np.flatnonzero(pieces.joint["real"])]
     return np.maximum.accumulate(near)
 
@@ -128,10 +124,8 @@ def largest_chord_error(readings: list[Observed]) -> float:
 def end_error(
     readings: list[Observed], toolpath: Toolpath, rounding: FloatArray
 ) -> tuple[float, list[Fault]]:
-    """Distance of the first and last sample from where the program starts and ends [mm], and the faults.
-
-    rounding : (A,) largest error of a position by its digits [mm]
-    """
+    """Distance of the first and last sample from where the program starts and ends [mm], and the faults; rounding (A,):
+    largest error of a position by its digits [mm]."""
     worst, said = 0.0, []
     allowed = CONTOUR_ROUNDING + float(np.linalg.norm(rounding))
     for reading in readings:
@@ -140,11 +134,10 @@ def end_error(
             ("end", reading.last, toolpath.end[-1], reading.t_last, toolpath.line[-1]),
         ):
             distance = float(np.linalg.norm(place - wanted))
-            worst = max(worst, distance)
+            worst, ratio = max(worst, distance), distance / allowed
             if distance > allowed:
                 text = f"the motion's {name} at t = {time:.6g} s is {distance:.6g} mm from the program's, "
                 text += reading.noted(f"{allowed:.2g} mm allowed, line {line}")
-                ratio = distance / allowed
                 said.append(Fault(Kind.ORDER, name, text, ratio=ratio, time=time, line=int(line)))
     return worst, said
 
@@ -155,14 +148,12 @@ def unvisited(
     """Segments (k,) that are never visited, whether the rest is run in order, and what is wrong with it."""
     lost = np.zeros(len(pieces.piece["segment"]), dtype=np.bool_)
     in_order, said = True, []
+    end_within = pieces.joint["budget"][-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
     for reading in readings:
         match = reading.match
-        end_reached = (
-            match.passed["near"][-1] <= pieces.joint["budget"][-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
-        )
         left_out = match.track["lost"].copy()
         left_out[match.tally[LAST] + 1 :] = True
-        left_out[-1] |= not end_reached
+        left_out[-1] |= not match.passed["near"][-1] <= end_within
         lost |= left_out
         here = np.unique(pieces.piece["segment"][left_out])
         if len(here):
@@ -183,9 +174,8 @@ def _order(found: str, line: int) -> Fault:
 
 
 def out_of_order(readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces) -> list[Fault]:
-    """The fault of a motion that is near enough to all of the path, but not in its order: it comes near to a
-    vertex before it has been at the one before. To be asked of a motion that has no other fault of the
-    contour, the vertices or the order."""
+    """The fault of a motion that is near enough to all of the path, but comes near to a vertex before it has been at the
+    one before. To be asked of a motion that has no other fault of the contour, the vertices or the order."""
     for reading in readings:
         at = int(reading.match.tally[STUCK_AT])
         if at != NOT_LOST:
@@ -215,25 +205,22 @@ def stop_faults(
         unknown = RATIO_ROUNDING * toolpath.dwell + hurry * reading.gap_max + 2.0 * limits.time_rounding
         short = toolpath.dwell - rest > unknown
 
-        def stop_fault(i: int, reading: Observed = reading, ratio: FloatArray = ratio) -> Fault:
-            by = reading.noted(f"{ratio[i]:.6g} of the speed or distance that a sample next to it can have")
-            return _at_joint(toolpath, i, "stop", f"no full stop at the {{}}: {by}", float(ratio[i]))
+        def fault(stop: bool, i: int, reading: Observed = reading, passed: Array = passed) -> Fault:
+            ratio, rest, line = (
+                float(passed["stop_ratio"][i]),
+                passed["rest"][i],
+                int(toolpath.line[max(i - 1, 0)]),
+            )
+            by = f"{rest:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed"
+            by = f"{ratio:.6g} of the speed or distance that a sample next to it can have" if stop else by
+            where = placed(toolpath.axes, toolpath.start[i] if i < len(toolpath) else toolpath.end[-1])
+            text = f"{'no full stop' if stop else 'too short'} at the {'end' if i else 'start'} of line {line}, {where}: "
+            name, of = ("stop", ratio) if stop else ("dwell", None)
+            return Fault(Kind.STOP, name, text + reading.noted(by), ratio=of, line=line)
 
-        def dwell_fault(i: int, reading: Observed = reading, rest: FloatArray = rest) -> Fault:
-            by = reading.noted(f"{rest[i]:.6g} s at most, {toolpath.dwell[i]:.6g} s programmed")
-            return _at_joint(toolpath, i, "dwell", f"too short at the {{}}: {by}", None)
-
-        said += first_of(np.flatnonzero(through), stop_fault, "such places")
-        said += first_of(np.flatnonzero(short), dwell_fault, "such places")
+        said += first_of(np.flatnonzero(through), partial(fault, True), "such places")
+        said += first_of(np.flatnonzero(short), partial(fault, False), "such places")
     return said
-
-
-def _at_joint(toolpath: Toolpath, i: int, name: str, found: str, ratio: float | None) -> Fault:
-    """The fault of a stop at joint i, which its text names where it has {}."""
-    line = int(toolpath.line[max(i - 1, 0)])
-    where = placed(toolpath.axes, toolpath.start[i] if i < len(toolpath) else toolpath.end[-1])
-    text = found.format(f"{'end' if i else 'start'} of line {line}, {where}")
-    return Fault(Kind.STOP, name, text, ratio=ratio, line=line)
 
 
 def line_of(toolpath: Toolpath, pieces: ProgramPieces, piece: int) -> int:

@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,28 +11,23 @@ from planner.base.errors import InputError
 from planner.geometry.toolpath import Toolpath
 from planner.machine import ROTARY_AXES
 from planner.motion.trajectory import Trajectory
-from planner.verifier.stops import STILL
+from planner.verifier.matching import STILL
 
 DERIVATIVES = ("velocity", "acceleration", "jerk")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Given:
-    """How much of a trajectory was given, and how exactly; without arguments all of it, in float64.
+    """How much of a trajectory was given, and how exactly; without arguments all of it, in float64."""
 
-    columns           : derivatives that were delivered; the others were derived from the positions by whoever
-                        read them, and only the positions are judged for them
-    position_rounding : (A,) largest error of a position by its digits [mm, rad], or () for none
-    time_rounding     : the same of every time [s]
-    end_rounding      : the same of the last time alone [s]: the others may lie on a grid, and be known by it
-    extruder_rounding : largest error of the extruder's place by its digits [mm of filament]
-    """
-
+    # derivatives that were delivered; the others were derived from the positions by whoever read them, which alone are judged
     columns: tuple[str, ...] = DERIVATIVES
-    position_rounding: FloatArray | tuple[float, ...] = ()
-    time_rounding: float = 0.0
-    end_rounding: float = 0.0
-    extruder_rounding: float = 0.0
+    position_rounding: (
+        FloatArray | tuple[float, ...]
+    ) = ()  # (A,) largest error by the digits [mm, rad], or () for none
+    time_rounding: float = 0.0  # the same of every time [s]
+    end_rounding: float = 0.0  # of the last time alone [s]: the others may lie on a grid, and be known by it
+    extruder_rounding: float = 0.0  # largest error of the extruder's place by its digits [mm of filament]
 
     def __post_init__(self) -> None:
         freeze(self, "position_rounding", float, (None,))
@@ -47,11 +43,8 @@ def fit_axes(
 ) -> tuple[Trajectory, Given, tuple[str, ...]]:
     """The trajectory and what is given of it, with the program's axes in its order; and what was done.
 
-    An axis of the program that it does not move may be missing: it stands where the program has it. An axis
-    that the program does not have may be there if it stands still, and is left out.
-
-    Raises InputError for an axis that the program moves and the trajectory lacks, and for one that the
-    trajectory moves and the program does not have.
+    An axis that the program does not move may be missing: it stands where the program has it. One that the program does
+    not have is left out if it stands still. Raises InputError for other missing axes, and others that the program lacks.
     """
     trajectory, given = _at_radius(trajectory, given, toolpath.radius)
     if trajectory.axes == toolpath.axes:
@@ -66,29 +59,24 @@ def fit_axes(
                     f"({' '.join(toolpath.axes)})"
                 )
             notes.append(f"{letter} stands still; the program and its machine do not have it")
-    samples = len(trajectory)
-    columns: dict[str, list[FloatArray]] = {name: [] for name in ("position", *DERIVATIVES)}
+    columns: dict[str, Any] = {
+        name: np.zeros((len(trajectory), len(toolpath.axes))) for name in ("position", *DERIVATIVES)
+    }
     rounding = np.zeros(len(toolpath.axes))
     for k, letter in enumerate(toolpath.axes):
         if letter in trajectory.axes:
             own = trajectory.axes.index(letter)
             for name, column in columns.items():
-                column.append(getattr(trajectory, name)[:, own])
+                column[:, k] = getattr(trajectory, name)[:, own]
             rounding[k] = given.position_rounding[own] if len(given.position_rounding) else 0.0
             continue
         stands = _standing(toolpath, k)
         if stands is None:
-            raise InputError(
-                f"column '{letter}' is missing: the program moves {letter}; found are the axes {' '.join(trajectory.axes)}"
-            )
+            found = f"found are the axes {' '.join(trajectory.axes)}"
+            raise InputError(f"column '{letter}' is missing: the program moves {letter}; {found}")
         notes.append(f"{letter} is missing, and stands at {stands:g} as in the program")
-        for name, column in columns.items():
-            column.append(np.full(samples, stands if name == "position" else 0.0))
-    fitted = dataclasses.replace(
-        trajectory,
-        axes=toolpath.axes,
-        **{name: np.stack(column, axis=1) for name, column in columns.items()},  # type: ignore[arg-type]
-    )
+        columns["position"][:, k] = stands
+    fitted = dataclasses.replace(trajectory, axes=toolpath.axes, **columns)
     return fitted, dataclasses.replace(given, position_rounding=rounding), tuple(notes)
 
 

@@ -1,8 +1,7 @@
 """Setpoints of the joints of a five-axis machine, judged: their limits, and the tip that they carry.
 
     joints   the limits of x, y, z as those of limits.py: on the delivered columns, and on divided differences of the positions
-    tip      brought back by the chain of kinematics.py, positions alone, and judged like any motion: rotary limits, feed, contour,
-             vertices, order
+    tip      brought back by the chain, positions alone, and judged like any motion: rotary limits, feed, contour, vertices, order
     between  the joints run straight from setpoint to setpoint, and so the tip does not: how far its middle leaves the middle of the
              tips at both ends is added to the contour error
 
@@ -10,11 +9,9 @@ A program's path has tip and angles in one norm, angles at a radius. The tool's 
 than the norm of what the angles change, d(direction)^2 = d(tilt)^2 + sin(tilt)^2 d(c)^2, so that the
 tolerance of the angles is one of the direction, too.
 
-The tip and the direction of the tool from delivered joints, for the verdict.
-
-Written as a chain of frames, from the tool's tip through the head to the machine and through the table to the
-workpiece, and so by other formulas than the planner's: with M1, M2 the matrices of the axes that carry the
-workpiece (outer, inner) about the points c1, c2, a point P of the machine is that of the workpiece
+The tip and the direction of the tool are a chain of frames, from the tool's tip through the head to the machine and
+through the table to the workpiece, by other formulas than the planner's: with M1, M2 the matrices of the axes that carry
+the workpiece (outer, inner) about the points c1, c2, a point P of the machine is that of the workpiece
 
     p = c2 + M2^T (c1 + M1^T (P - c1) - c2)
 
@@ -69,9 +66,8 @@ def verify_joints(
     """
     if machine.kinematics is None:
         raise InputError(f"machine '{machine.name}' has no table [kinematics]")
-    carried = _Carried(
-        machine, setpoints, machine.kinematics.tool_length if tool_length is None else tool_length
-    )
+    length = machine.kinematics.tool_length if tool_length is None else tool_length
+    carried = _Carried(machine, setpoints, length)
     given = Given() if given is None else given
     # a limit of the normal acceleration is not one of the tip, with whose workpiece it moves
     tip = verify(
@@ -95,8 +91,8 @@ def verify_joints(
         of_path = "an unknown distance" if error is None else f"{error:.6g} mm"
         found = (
             f"up to {gap:.4g} mm beside its chord between setpoints of the joints: {of_path} from the path, "
-            f"with {tolerance:.6g} mm allowed"
         )
+        found += f"with {tolerance:.6g} mm allowed"
         faults.append(Fault(Kind.CONTOUR, "tip", found, ratio=None if error is None else error / tolerance))
     more, linear = 0.0 if error is None else gap, tip.linear_error_mm
     value, ratio = tip.contour.value + more, tip.contour.ratio + more / tolerance
@@ -123,7 +119,7 @@ def _in_order(limits: dict[str, LimitCheck]) -> dict[str, LimitCheck]:
 
 
 class _Carried:
-    """The tip that joints carry, by the chain of frames of kinematics.py."""
+    """The tip that joints carry, by the chain of frames."""
 
     def __init__(self, machine: Machine, setpoints: Trajectory, length: float):
         axes, radius = setpoints.axes, setpoints.radius
@@ -134,10 +130,8 @@ class _Carried:
     def tips(self, position: FloatArray) -> FloatArray:
         """(n, A) places with x, y, z of the tip for those of the joints."""
         assert self.data is not None
-        found = position.copy()
-        found[:, self.linear], _ = tip_and_direction(
-            self.data, self.length, self.axes, position * self.per_length
-        )
+        found, joints = position.copy(), position * self.per_length
+        found[:, self.linear], _ = tip_and_direction(self.data, self.length, self.axes, joints)
         return found
 
     def motion(self, setpoints: Trajectory) -> Trajectory:
@@ -188,8 +182,7 @@ def _joint_checks(
 def _about(letter: str, angle: FloatArray) -> FloatArray:
     """(n, 3, 3) right-handed rotations about x, y or z by angle (n,)."""
     i, j = {"a": (1, 2), "b": (2, 0), "c": (0, 1)}[letter]
-    matrix = np.zeros((len(angle), 3, 3))
-    matrix[:] = np.eye(3)
+    matrix = np.tile(np.eye(3), (len(angle), 1, 1))
     matrix[:, i, i] = matrix[:, j, j] = np.cos(angle)
     matrix[:, j, i] = np.sin(angle)
     matrix[:, i, j] = -matrix[:, j, i]
@@ -202,10 +195,8 @@ def tip_and_direction(
     """(n, 3) controlled point in program coordinates [mm] and (n, 3) unit vector of the tool, seen from the
     workpiece, for joints (n, A) of the axes [mm, rad] and a tool of that length [mm]."""
     column = dict(zip(axes, np.asarray(joints, dtype=np.float64).T, strict=True))
-    turned = {
-        letter: _about(letter, -column[letter] if letter in data.reversed else column[letter])
-        for letter in data.rotary
-    }
+    sign = {letter: -1.0 if letter in data.reversed else 1.0 for letter in data.rotary}
+    turned = {letter: _about(letter, sign[letter] * column[letter]) for letter in data.rotary}
     tilt, c = turned[data.rotary[0]], turned["c"]
     q = np.stack([column["x"], column["y"], column["z"]], axis=1)
     rest = np.broadcast_to(np.eye(3), tilt.shape)

@@ -83,12 +83,11 @@ def verify(
     of_samples += reader.comparison.faults(limits, readings) if reader.comparison is not None else []
     of_samples += findings.column_faults(readings, limits, toolpath, pieces)
     of_samples += samples.rest_faults(reader.delivered, readings, limits, toolpath.velocities)
-    threads = thread_checks(trajectory, readings, toolpath, pieces, machine)
-    extruder = extruder_seen(trajectory, readings, toolpath, pieces, given, not_limited)
-    checks |= extruder.checks
-    notes += extruder.notes
-    after = after_filters(trajectory, toolpath, machine, pieces)
     passed = findings.joint_times(readings[0], pieces)
+    threads = thread_checks(trajectory, passed, toolpath, machine)
+    more_checks, of_extruder, more_notes = extruder_seen(trajectory, passed, toolpath, given, not_limited)
+    checks, notes = checks | more_checks, notes + more_notes
+    after = after_filters(trajectory, toolpath, machine, pieces)
     of_travel = (
         [] if travel.NAME in not_limited else travel.travel_faults(trajectory, toolpath, machine, passed)
     )
@@ -114,7 +113,7 @@ def verify(
         *findings.stop_faults(readings, toolpath, pieces, limits),
         *exact_faults(trajectory, readings, toolpath, limits),
         *thread_faults(threads),
-        *extruder.faults,
+        *of_extruder,
         *(after.faults if after is not None else ()),
         *error_allocation.faults(corners, toolpath.axes),
     )

@@ -20,17 +20,12 @@ so that of the mean
 
     |a - (a.u) u| <= N + A sin(min(N w / v, pi/2)),      v = chord / w - A w,
 
-where the second term is taken off.
-
-Only columns that were delivered are judged as columns, and compared with the positions.
+where the second term is taken off. Only columns that were delivered are judged, and compared with the positions.
 """
-
-import math
-from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.between import Between
@@ -38,7 +33,6 @@ from planner.verifier.excess import NAMES
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.kernel import kernel
 from planner.verifier.pieces import RATIO_ROUNDING
-from planner.verifier.power import units_of
 from planner.verifier.worst import (
     COLUMN,
     DIFFERENCE,
@@ -54,6 +48,7 @@ from planner.verifier.worst import (
 FEED_AT_REST = 1e-6
 NORMAL_NAME, TANGENTIAL_NAMES = "normal_acceleration", ("acceleration.tangential", "jerk.tangential")
 UNITS = ("/s", "/s2", "/s3")
+PER_MM2 = 1e-6  # m2 in a mm2: 1 mm2/s3 is 1e-6 W/kg, of rotary axes W/(kg m2) at the machine's radius
 
 # Rows of `Worst`: six groups of one row per axis, then some of their own, then the power of each axis, and three per user limit.
 VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERATION = range(6)
@@ -75,11 +70,9 @@ def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limite
         rounding=_rounding(trajectory, given, per_axis[1]),
         time_rounding=given.time_rounding,
         normal=normal_limit(machine),
-        tangential=np.array(
-            [machine.tangential_acceleration or math.inf, machine.tangential_jerk or math.inf]
-        ),
-        power=np.array([machine.axes[letter].power or math.inf for letter in axes]),
-        power_unit=units_of(machine, axes),
+        tangential=np.array([machine.tangential_acceleration or np.inf, machine.tangential_jerk or np.inf]),
+        power=np.array([machine.axes[letter].power or np.inf for letter in axes]),
+        power_unit=np.array([machine.radius**-2.0 if a in ROTARY_AXES else PER_MM2 for a in axes]),
         acceleration_at_stop=np.where("acceleration" in not_limited, np.inf, per_axis[1]),
         jerk_limited="jerk" not in not_limited,
         user=tuple(limit for limit in machine.own if not getattr(limit, "of_extruder", False)),
@@ -88,7 +81,7 @@ def limits_of(machine: Machine, trajectory: Trajectory, given: Given, not_limite
 
 def _rounding(trajectory: Trajectory, given: Given, acceleration: FloatArray) -> FloatArray:
     """(A,) largest error of a position by its digits and those of the last time, at its speed there [mm]."""
-    rounding = np.zeros(len(acceleration))
+    rounding: FloatArray = np.zeros(len(acceleration))
     if len(given.position_rounding):
         rounding = rounding + given.position_rounding
     if given.end_rounding and len(trajectory) > 1:
@@ -100,7 +93,7 @@ def _rounding(trajectory: Trajectory, given: Given, acceleration: FloatArray) ->
 
 def normal_limit(machine: Machine) -> float:
     """The machine's limit of the normal acceleration [mm/s2]; inf if it names none."""
-    return machine.normal_acceleration or math.inf
+    return machine.normal_acceleration or np.inf
 
 
 def rows_of(limits: Limits) -> list[tuple[str, str]]:
@@ -137,7 +130,7 @@ def look_at_axes(
     axes, linear, alone = len(limits.axes), limits.linear, GROUPS * len(limits.axes)
     nothing = np.empty((0, axes))
     widest = (nothing, nothing) if between is None else (between.velocity, between.acceleration)
-    allowed = Allowed(
+    allowed = (
         limits.per_axis,
         linear,
         limits.judged,
@@ -170,53 +163,29 @@ def look_at_axes(
     return float(travelled)
 
 
-class Allowed(NamedTuple):
-    """Some of `Limits`, for the kernel."""
-
-    per_axis: FloatArray
-    linear: Array
-    judged: Array
-    rounding: FloatArray
-    time_rounding: float
-    normal: float
-
-
 @kernel()
-def _look(
-    t: FloatArray,
-    state: FloatArray,
-    widest: tuple[FloatArray, FloatArray],
-    piece: Array,
-    skip: int,
-    travelled: float,
-    allowed: Allowed,
-    sure: bool,
-    work: FloatArray,
-    found: tuple[FloatArray, FloatArray, FloatArray, Array],
-    most: FloatArray,
-) -> float:
+def _look(t, state, widest, piece, skip, travelled, allowed, sure, work, found, most):
     """The columns of samples, the differences of their positions (worst.py), by how much the columns miss these (module text)
     over h, h^2, h, and the normal acceleration by the columns.
 
     t, state, piece, skip, travelled : as in `SampleBlock`
-    widest : (n, A) velocities and accelerations in place of the columns, which the differences are compared with; or (0, A)
-    work   : (5, A) zeros: of the sample before its error, first and second difference with theirs
-    found  : row, time, at and piece of `Worst`
-    most   : (6,) largest ratio of the columns of each quantity of `NAMES`, where it is above 1
+    widest  : (n, A) velocities and accelerations in place of the columns, which the differences are compared with; or (0, A)
+    allowed : per_axis, linear, judged, rounding, time_rounding and normal of `Limits`
+    work    : (5, A) zeros: of the sample before its error, first and second difference with theirs
+    found   : row, time, at and piece of `Worst`
+    most    : (6,) largest ratio of the columns of each quantity of `NAMES`, where it is above 1
 
     -> path length run to the last sample [mm]
     """
     n, _, axes = state.shape
-    (v_max, a_max, j_max), judged = allowed.per_axis, allowed.judged
+    (v_max, a_max, j_max), linear, judged, rounding, time_rounding, normal_max = allowed
     ulp, run, none = ROUNDING_ULPS * 2.0**-52, 0.0, -1
     for k in range(n):
         here = k, t, state, piece
         h = t[k] - t[k - 1] if k else np.inf
-        over, over2, over3 = 1.0 / h, 0.0, 0.0
-        if k > 1:
-            over2 = 2.0 / (t[k] - t[k - 2])
-        if k > 2:
-            over3 = 3.0 / (t[k] - t[k - 3])
+        over = 1.0 / h
+        over2 = 2.0 / (t[k] - t[k - 2]) if k > 1 else 0.0
+        over3 = 3.0 / (t[k] - t[k - 3]) if k > 2 else 0.0
         if k >= max(skip, 1):
             step_sq = 0.0
             for i in range(axes):
@@ -225,20 +194,12 @@ def _look(
         speed_sq, along = 0.0, 0.0
         for i in range(axes):
             x, v, a = state[k, 0, i], state[k, 1, i], state[k, 2, i]
-            if allowed.linear[i]:
+            if linear[i]:
                 speed_sq, along = speed_sq + v * v, along + v * a
             if k >= skip:
                 if judged[0]:
-                    _keep(
-                        found,
-                        most,
-                        0,
-                        i,
-                        widest[0][k, i] if len(widest[0]) else abs(v),
-                        v_max[i],
-                        COLUMN,
-                        here,
-                    )
+                    most_v = widest[0][k, i] if len(widest[0]) else abs(v)
+                    _keep(found, most, 0, i, most_v, v_max[i], COLUMN, here)
                 if judged[1]:
                     most_a = widest[1][k, i] if len(widest[1]) else abs(a)
                     _keep(found, most, 1, axes + i, most_a, a_max[i], COLUMN, here)
@@ -246,13 +207,13 @@ def _look(
                     _keep(found, most, 2, 2 * axes + i, abs(state[k, 3, i]), j_max[i], COLUMN, here)
             if sure:
                 continue
-            off = ulp * (abs(x) + (travelled + run) + v_max[i] * t[k]) + allowed.rounding[i]
+            off = ulp * (abs(x) + (travelled + run) + v_max[i] * t[k]) + rounding[i]
             if k == 0:
                 work[0, i] = off
                 continue
             change = x - state[k - 1, 0, i]
-            if allowed.time_rounding > 0.0:
-                late = allowed.time_rounding * (abs(change) / h + a_max[i] * h)
+            if time_rounding > 0.0:
+                late = time_rounding * (abs(change) / h + a_max[i] * h)
                 off += late
                 work[0, i] += late if k == 1 else 0.0
             first, wrong = over * change, over * (off + work[0, i])
@@ -272,17 +233,18 @@ def _look(
                 _keep(found, most, none, GAP_BY_JERK * axes + i, gap * over, j_max[i] / 12.0, COLUMN, here)
                 if judged[1]:
                     noise = RATIO_ROUNDING * (v_max[i] * over + a_max[i])
-                    gap = max(abs((v - v0) * over - 0.5 * (a + a0)) - noise, 0.0) * over
-                    _keep(
-                        found, most, none, GAP_OF_ACCELERATION * axes + i, gap, j_max[i] / 4.0, COLUMN, here
+                    gap, row = (
+                        max(abs((v - v0) * over - 0.5 * (a + a0)) - noise, 0.0) * over,
+                        GAP_OF_ACCELERATION * axes + i,
                     )
+                    _keep(found, most, none, row, gap, j_max[i] / 4.0, COLUMN, here)
         if k >= skip and judged[0] and judged[1] and speed_sq > FEED_AT_REST * FEED_AT_REST:
             across = 0.0
             for i in range(axes):
-                if allowed.linear[i]:
+                if linear[i]:
                     across += (state[k, 2, i] - along / speed_sq * state[k, 1, i]) ** 2
             normal, bow = np.sqrt(across), h if k else 0.0
-            _keep(found, most, OF_NORMAL, GROUPS * axes + NORMAL, normal, allowed.normal, COLUMN, here)
+            _keep(found, most, OF_NORMAL, GROUPS * axes + NORMAL, normal, normal_max, COLUMN, here)
             _keep(found, most, none, GROUPS * axes + CHORD, normal * bow * bow / 8.0, 1.0, COLUMN, here)
     return travelled + run
 

@@ -14,23 +14,32 @@ pieces that can be reached, which makes it linear in time:
 
 On lines this is exact, since there every cell (chord, piece) of the free space is convex. On arcs the
 distances are exact, the vertices every 22.5 degrees must be passed in order, and between them going back is
-seen to second order in eps / radius. The nearest point plays no part: dense spirals whose turns are closer
-than eps, reversals and thousands of pieces within eps are told apart by order alone.
+seen to second order in eps / radius. Dense spirals whose turns are closer than eps, reversals and thousands of
+pieces within eps are told apart by order alone.
 
-The error reported for a sample is its distance from the nearest of the pieces that it can belong to; the
-error of a vertex is its distance from the chords run while the piece before it was possible.
+The error of a sample is its distance from the nearest of the pieces that it can belong to; that of a vertex is
+its distance from the chords run while the piece before it was possible.
 
 Where nothing within eps is possible any more, it goes on as follows, so that a fault is measured:
   1. a vertex passed at up to twice its budget is taken as passed (a corner cut too deep; the motion itself is
   near the path); 2. the budget is widened, up to twice, to the least that lets the motion go on (a contour
   error); 3. the first piece ahead within eps is taken, what lies between is lost (a block left out); 4. the
-  place on the path is held until one of these works: the motion is lost.
+  place on the path is held until one of these works: the motion is lost. Its samples enter no contour error, and
+  a vertex on lost pieces that no chord was compared with keeps the distance inf.
 
-A lost motion has no distance from the path: which part of the path it would have to be near is what is not
-known. Its samples enter no contour error, and a vertex on lost pieces that no chord was compared with keeps
-the distance inf.
+A full stop. A motion that rests at the vertex at some time within a period h has, with |acceleration| <= a, over the
+period a chord of at most a h^2 / 2, and the nearer end of the period is at most a (h/2)^2 / 2 away; where
+jerk is limited to j, at rest the acceleration is zero too, and it is j h^3 / 6 and j (h/2)^3 / 6. Per axis, each.
+Who is d away from where he rests left it, or has still to go, for
+
+    tau(d) = the larger of  (6 d / j)^(1/3),  (2 d / a)^(1/2)
+
+at least, the largest of the axes: of a period between samples d0 and d1 away he can rest h - tau(d0) -
+tau(d1), and no longer. Of a motion that leaves with the whole jerk, that is how long it rests, wherever the
+samples fall.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -38,14 +47,15 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.verifier.pieces import (
     CONTOUR_ROUNDING,
+    PLACE_ROUNDING,
     RATIO_ROUNDING,
     ProgramPieces,
     kernel,
     reach_chord,
     reach_piece,
 )
-from planner.verifier.stops import AtStop, longest_rest, watch_stop
 
+STILL = 1e-9  # [mm] displacement over one period that is a standstill: rounding of coordinates up to 1e6 mm
 NEAR_MISS = 2.0  # errors up to this multiple of the budget are matched in place; beyond, a block is left out
 BISECTIONS = 12  # of the widened budget: 1/4096 of it
 PIECES_AHEAD = 5_000  # looked through for the block at which a lost motion comes back
@@ -60,24 +70,18 @@ BEFORE, POINT, WORST_AT = range(3)  # in Match.place
 
 
 class Match(NamedTuple):
-    """State of the matching after some samples, and what it has found; all arrays are written in place.
+    """State of the matching after some samples, and what it has found; all arrays are written in place."""
 
-    track  : (N,) per piece: low, new = its lowest possible fraction, now and next; lost, if it was left out
-    passed : (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the
-             motion has to stop: rest = the longest that it can have rested there [s], stop_ratio = how well
-             it stops, <= 1 if within what samples can show
-    tally  : (8,) first and last possible piece; jumps over lost pieces; pieces searched; samples held; the
-             last piece that was possible when the motion was lost first, or NOT_LOST; 1 while it is lost; the
-             vertex at which the motion did not fit into the budgets first, or NOT_LOST
-    place  : (3, A) the sample before, the present one, the worst one [mm]
-    worst  : (6,) of the worst sample that is not lost: ratio, distance [mm], budget [mm], time [s], piece;
-             largest distance of any [mm]
-    """
-
-    track: Array
+    track: Array  # (N,) per piece: low, new = its lowest possible fraction, now and next; lost, if it was left out
+    # (N+1,) per vertex: near = smallest distance from the motion [mm], near_time = when [s]; where the motion has to stop: rest =
+    # the longest that it can have rested there [s], stop_ratio = how well it stops, <= 1 if within what samples can show
     passed: Array
+    # (8,) first and last possible piece; jumps over lost pieces; pieces searched; samples held; the last piece that was possible
+    # when the motion was lost first, or NOT_LOST; 1 while it is lost; the vertex at which it did not fit into the budgets first, or
+    # NOT_LOST
     tally: Array
-    place: FloatArray
+    place: FloatArray  # (3, A) the sample before, the present one, the worst one [mm]
+    # (6,) of the worst sample that is not lost: ratio, distance [mm], budget [mm], time [s], piece; largest distance of any [mm]
     worst: FloatArray
 
 
@@ -107,20 +111,19 @@ def nowhere(samples: int) -> Located:
     return Located(piece, np.zeros(samples), first, last)
 
 
+class AtStop(NamedTuple):
+    """How far and how fast a sample can be next to a stop: (A,) largest accelerations [mm/s2] and jerks
+    [mm/s3], inf where they are not limited, and errors of positions by their digits [mm]."""
+
+    acceleration_max: FloatArray
+    jerk_max: FloatArray
+    rounding: FloatArray
+
+
 @kernel()
-def match_samples(
-    pieces: ProgramPieces,
-    match: Match,
-    t: FloatArray,
-    position: FloatArray,
-    skip: int,
-    parts: int,
-    velocity: FloatArray,
-    at_stop: AtStop,
-    place: Located,
-) -> None:
+def match_samples(pieces, match, t, position, skip, parts, velocity, at_stop, place):
     """Match samples `skip` to the last, in `match`, and write their places; those before belong to the
-    previous call. The first call has skip = 0.
+    previous call.
 
     t, position : (n,) [s], (n, A) [mm]
     parts       : into how many a period is divided: the places between are samples too
@@ -151,35 +154,27 @@ def match_samples(
             place.piece[k], place.feed_max[k] = _step(pieces, match, before, point, t[k] - rest * period)
             for i in range(first, match.tally[LAST] + 2):
                 if k and pieces.joint[i]["stop"]:
-                    watch_stop(pieces, match.passed, i, before, point, period, parts, at_stop)
+                    _watch_stop(pieces, match.passed, i, before, point, period, parts, at_stop)
             for axis in range(axes):
                 before[axis] = point[axis]
         for i in range(began, match.tally[LAST] + 2):
             if k and pieces.joint[i]["stop"]:
-                match.passed[i]["rest"] += longest_rest(
-                    pieces, i, position[k - 1], position[k], period, at_stop
-                )
+                rest = _longest_rest(pieces, i, position[k - 1], position[k], period, at_stop)
+                match.passed[i]["rest"] += rest
         place.first[k], place.last[k] = match.tally[FIRST], match.tally[LAST]
         if match.tally[ASTRAY]:
             place.last[k] = -2
 
 
 @kernel(inline=True)
-def _step(
-    pieces: ProgramPieces, match: Match, before: FloatArray, point: FloatArray, time: float
-) -> tuple[int, float]:
-    """Go on from `before` to `point`; return the piece it lies on and the largest feed of those it can lie
-    on.
-
-    Where nothing within the budget is possible, go on as the module's text says.
-    """
+def _step(pieces, match, before, point, time):
+    """Go on from `before` to `point`, where nothing within the budget is possible as the module's text says; return the
+    piece it lies on and the largest feed of those it can lie on."""
     little, enough = 1.0, NEAR_MISS  # the bisection of the widened budget
     widen, widen_vertex = 1.0, 1.0
     for attempt in range(BISECTIONS + 4):
-        late = attempt > 0
-        first, last, distance, i, feed, stuck = _column(
-            pieces, match, before, point, time, widen, widen_vertex, late
-        )
+        found = _column(pieces, match, before, point, time, widen, widen_vertex, attempt > 0)
+        first, last, distance, i, feed, stuck = found
         if attempt == 0 and first > last and match.tally[STUCK_AT] == NOT_LOST:
             match.tally[STUCK_AT] = stuck
         if attempt <= 1:  # 0: as it should be, 1: a vertex missed by little
@@ -209,24 +204,14 @@ def _step(
 
 
 @kernel(inline=True)
-def _column(
-    pieces: ProgramPieces,
-    match: Match,
-    before: FloatArray,
-    point: FloatArray,
-    time: float,
-    widen: float,
-    widen_vertex: float,
-    late: bool,
-) -> tuple[int, int, float, int, float, int]:
+def _column(pieces, match, before, point, time, widen, widen_vertex, late):
     """Which pieces `point` can lie on, into match.track.new. The one step of the sweep.
 
     widen, widen_vertex : factors on the budgets of samples and vertices
     late                : a vertex counts as passed if any earlier chord came near enough
 
-    -> first and last possible piece (first > last: none), distance from the nearest of them, that piece,
-    largest feed, and the vertex
-       that was not passed
+    -> first and last possible piece (first > last: none), distance from the nearest of them, that piece, largest feed,
+    and the vertex that was not passed
     """
     track, passed = match.track, match.passed
     i, last_before = match.tally[FIRST], match.tally[LAST]
@@ -263,14 +248,9 @@ def _column(
 
 
 @kernel()
-def _stray(
-    pieces: ProgramPieces, match: Match, before: FloatArray, point: FloatArray, time: float
-) -> tuple[float, int, float]:
+def _stray(pieces, match, before, point, time):
     """Far from where the program should be: take the first piece ahead that fits, or hold the place on the
-    path, lost.
-
-    -> distance [mm], inf if lost; piece, feed [mm/s]
-    """
+    path, lost. -> distance [mm], inf if lost; piece, feed [mm/s]"""
     track, passed, tally = match.track, match.passed, match.tally
     begin = tally[LAST] + 1
     for ahead in range(begin, min(begin + PIECES_AHEAD, len(track))):
@@ -304,7 +284,7 @@ def _stray(
 
 
 @kernel(inline=True)
-def _commit(match: Match, first: int, last: int) -> None:
+def _commit(match, first, last):
     """Make the possible pieces `first` to `last` of match.track.new the present ones."""
     match.tally[ASTRAY] = 0
     for i in range(match.tally[FIRST], match.tally[LAST] + 1):
@@ -315,5 +295,40 @@ def _commit(match: Match, first: int, last: int) -> None:
 
 
 @kernel(inline=True)
-def _allowed(budget: float) -> float:
+def _allowed(budget):
     return budget * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
+
+
+@kernel()
+def _watch_stop(pieces, passed, i, before, point, period, parts, at_stop):
+    """The chord from `before` to `point` (A,), one of `parts` of a period [s], shows of the stop at vertex i,
+    into `passed`."""
+    acceleration_max, rounding = at_stop.acceleration_max, at_stop.rounding
+    slow, away_sq = 0.0, 0.0
+    for axis in range(len(point)):
+        move = abs(point[axis] - before[axis])
+        bow = acceleration_max[axis] * period * period / 8.0
+        most = 4.0 * bow
+        if math.isfinite(at_stop.jerk_max[axis]):
+            bow = min(bow, at_stop.jerk_max[axis] * period**3 / 48.0)
+            most = min(most, at_stop.jerk_max[axis] * period**3 / 6.0)
+        slow = max(slow, max(move * parts - STILL - 2.0 * rounding[axis], 0.0) / most)
+        away_sq += (bow + rounding[axis]) ** 2
+    away = math.sqrt(away_sq) + PLACE_ROUNDING
+    _, _, apart = reach_chord(before, point, pieces, i, 0.0)
+    passed[i]["stop_ratio"] = min(passed[i]["stop_ratio"], max(slow, apart / away))
+
+
+@kernel()
+def _longest_rest(pieces, i, before, point, period, at_stop):
+    """How long a motion with samples `before` and `point` (A,), a period [s] apart, can rest at vertex i
+    between them [s]."""
+    early, late = 0.0, 0.0
+    for axis in range(len(point)):
+        rounding = PLACE_ROUNDING + at_stop.rounding[axis]
+        a, j, there = at_stop.acceleration_max[axis], at_stop.jerk_max[axis], pieces.vertex[i, axis]
+        was = max(abs(before[axis] - there) - rounding, 0.0)
+        will = max(abs(point[axis] - there) - rounding, 0.0)
+        early = max(early, (6.0 * was / j) ** (1.0 / 3.0), math.sqrt(2.0 * was / a))
+        late = max(late, (6.0 * will / j) ** (1.0 / 3.0), math.sqrt(2.0 * will / a))
+    return max(period - early - late, 0.0)

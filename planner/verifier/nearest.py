@@ -24,7 +24,6 @@ d + b from the vertex, and 2 (d + b) apart; the way between them is taken as at 
 
 import math
 
-from planner.base.arrays import FloatArray
 from planner.verifier.kernel import kernel
 from planner.verifier.pieces import PLACE_ROUNDING
 
@@ -41,7 +40,7 @@ def _rise(c, x):
 
 
 @kernel()
-def nearest(vertex: FloatArray, ends: FloatArray, cut: float, h: float) -> tuple[float, float, float, float]:
+def nearest(vertex, ends, cut, h):
     """Least distance d of a motion from a vertex (A,) over h [s], which share of the chord is run there, its g and v.
 
     ends : (2, 4, A) position, velocity, acceleration and jerk at both ends
@@ -94,14 +93,7 @@ def nearest(vertex: FloatArray, ends: FloatArray, cut: float, h: float) -> tuple
 
 
 @kernel()
-def reach_of(
-    found: tuple[float, float, float, float],
-    ends: FloatArray,
-    cut: float,
-    h: float,
-    acceleration: float,
-    rounding: float,
-) -> float:
+def reach_of(found, ends, cut, h, acceleration, rounding):
     """How far the nearest place of a motion can be from what `nearest` has `found` between two ends [mm].
 
     ends, cut, h : (2, 4, A), [s], [s] as there

@@ -54,41 +54,27 @@ class Bounds(NamedTuple):
 
 
 class Chords(NamedTuple):
-    """Samples whose feed is still to be judged, the first one as the beginning of a chord.
+    """Samples whose feed is still to be judged, the first one as the beginning of a chord; (n,) each."""
 
-    t, place, error : (n,) [s]; length of chords from the start [mm]; largest rounding error [mm]
-    speed           : (n,) as delivered [mm/s], NaN where it was not
-    piece           : (n,) where each is, to be told; first, last: (n,) the pieces it can be on (matching.py)
-    cut             : (n,) as `Between.cut` [s], NaN where nothing is known between
-    state           : (n, D, A) position, and derivatives where `cut` is known
-    """
-
-    t: FloatArray
-    place: FloatArray
-    error: FloatArray
-    speed: FloatArray
-    piece: Array
-    first: Array
+    t: FloatArray  # [s]
+    place: FloatArray  # length of chords from the start [mm]
+    error: FloatArray  # largest rounding error [mm]
+    speed: FloatArray  # as delivered [mm/s], NaN where it was not
+    piece: Array  # where each is, to be told
+    first: Array  # the pieces it can be on (matching.py), and the last of them
     last: Array
-    cut: FloatArray
-    state: FloatArray
+    cut: FloatArray  # as `Between.cut` [s], NaN where nothing is known between
+    state: FloatArray  # (n, D, A) position, and derivatives where `cut` is known
 
 
 class Passing(NamedTuple):
-    """Where a motion passes the vertices, as far as its samples tell.
+    """Where a motion passes the vertices, as far as its samples tell."""
 
-    switch  : (N+1,) `SWITCH`
-    state   : (6,) as named above
-    along   : (3,) likewise; its last number is for who judges, and what is judged stays
-    work    : (A,) a place that is worked with
-    chord, ends, mark : chords since the last vertex that was settled: `CHORD` (C,), position and its derivatives at
-              their ends (C, 2, 4, A), and marks
-    """
-
-    switch: Array
-    state: Array
-    along: FloatArray
-    work: FloatArray
+    switch: Array  # (N+1,) `SWITCH`
+    state: Array  # (6,) as named above
+    along: FloatArray  # (3,) likewise; its last number is for who judges, and what is judged stays
+    work: FloatArray  # (A,) a place that is worked with
+    # chords since the last vertex that was settled: `CHORD` (C,), position and derivatives at their ends (C, 2, 4, A), marks
     chord: Array
     ends: FloatArray
     mark: Array

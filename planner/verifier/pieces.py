@@ -35,22 +35,15 @@ JOINT = np.dtype([("budget", "f8"), ("stop", "i8"), ("real", "?")])
 
 
 class ProgramPieces(NamedTuple):
-    """N pieces over A axes, the N+1 vertices around them, the K arcs and curves; few arrays, as calls cost.
+    """N pieces over A axes, the N+1 vertices around them, the K arcs and curves; few arrays, as calls cost."""
 
-    vertex : (N+1, A) [mm]
-    joint  : (N+1,) `JOINT`, what holds at a vertex: budget [mm]; stop (0 or 1); real: of the program
-    piece  : (N,) `PIECE`: budget [mm]; feed in all axes [mm/s]; word, that in the axes of group `by` alone;
-             x0, x1 range of the arc's parameter [mm], or of the curve's [-]; arc: row of an arc, -1 for a
-             line, -2 - row of a curve; segment
-    frame  : (K, 4, A) center, e1, e2, drift of an arc; control points of a curve
-    turn   : (K, 2) radius [mm], rate [rad/mm] of an arc; weights of the inner control points of a curve
-    """
-
-    vertex: FloatArray
-    joint: Array
+    vertex: FloatArray  # (N+1, A) [mm]
+    joint: Array  # (N+1,) `JOINT`: budget [mm]; stop (0 or 1); real: of the program
+    # (N,) `PIECE`: budget [mm]; feed in all axes [mm/s]; word, that in the axes of group `by` alone; x0, x1 range of the arc's
+    # parameter [mm], or of the curve's [-]; arc: row of an arc, -1 for a line, -2 - row of a curve; segment
     piece: Array
-    frame: FloatArray
-    turn: FloatArray
+    frame: FloatArray  # (K, 4, A) center, e1, e2, drift of an arc; control points of a curve
+    turn: FloatArray  # (K, 2) radius [mm], rate [rad/mm] of an arc; weights of the inner control points of a curve
 
 
 def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPieces:
@@ -108,9 +101,7 @@ def program_pieces(toolpath: Toolpath, halved: Array | None = None) -> ProgramPi
 
 def axis_groups(axes: tuple[str, ...]) -> Array:
     """(A,) 0 for x, y, z, 1 for u, v, w, 2 for rotary axes: F is the speed in the first group that moves."""
-    return np.array(
-        [("xyz", "uvw", "abc").index(next(g for g in ("xyz", "uvw", "abc") if a in g)) for a in axes]
-    )
+    return np.array(["xyzuvwabc".index(letter) // 3 for letter in axes])
 
 
 def counted_axes(toolpath: Toolpath) -> tuple[Array, FloatArray]:
@@ -142,13 +133,12 @@ def _check_consistent(toolpath: Toolpath, computed_start: FloatArray, computed_e
         bad = np.flatnonzero(distance > PLACE_ROUNDING)
         if len(bad):
             k = int(bad[0]) + len(toolpath) - len(distance)
-            raise ValueError(
-                f"Toolpath: segment {k} (line {toolpath.line[k]}) {what}: {distance[bad[0]]:.3g} mm apart"
-            )
+            where = f"Toolpath: segment {k} (line {toolpath.line[k]})"
+            raise ValueError(f"{where} {what}: {distance[bad[0]]:.3g} mm apart")
 
 
 @kernel(inline=True)
-def reach_piece(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> tuple[float, float, float]:
+def reach_piece(pieces, i, q, radius):
     """Which part of piece i lies within `radius` of the point q (A,).
 
     -> (a, b, distance): the part as fractions of the piece, empty if a > b; the distance of q from the piece
@@ -157,51 +147,27 @@ def reach_piece(pieces: ProgramPieces, i: int, q: FloatArray, radius: float) -> 
     """
     if pieces.piece[i]["arc"] != STRAIGHT:
         return reach_bend(pieces, i, q, radius)
-    vertex = pieces.vertex
-    along, length_sq = 0.0, 0.0
-    for n in range(len(q)):
-        u, w = vertex[i + 1, n] - vertex[i, n], q[n] - vertex[i, n]
-        along += w * u
-        length_sq += u * u
-    x = along / length_sq if length_sq > 0.0 else 0.0
-    off_sq = 0.0
-    for n in range(len(q)):
-        off_sq += (q[n] - vertex[i, n] - x * (vertex[i + 1, n] - vertex[i, n])) ** 2
-    return _within(x, off_sq, length_sq, radius)
+    return _reach_line(pieces.vertex[i], pieces.vertex[i + 1], q, radius)
 
 
 @kernel(inline=True)
-def reach_chord(
-    begin: FloatArray, end: FloatArray, pieces: ProgramPieces, i: int, radius: float
-) -> tuple[float, float, float]:
+def reach_chord(begin, end, pieces, i, radius):
     """Which part of the chord from `begin` to `end` (A,), which may be a point, lies within `radius` of
     vertex i; as `reach_piece`."""
-    vertex = pieces.vertex
-    along, length_sq = 0.0, 0.0
-    for n in range(len(begin)):
-        u, w = end[n] - begin[n], vertex[i, n] - begin[n]
+    return _reach_line(begin, end, pieces.vertex[i], radius)
+
+
+@kernel(inline=True)
+def _reach_line(begin, end, q, radius):
+    """Which part of the line from `begin` to `end` (A,) lies within `radius` of q (A,), as `reach_piece`."""
+    along, length_sq, off_sq = 0.0, 0.0, 0.0
+    for n in range(len(q)):
+        u, w = end[n] - begin[n], q[n] - begin[n]
         along += w * u
         length_sq += u * u
     x = along / length_sq if length_sq > 0.0 else 0.0
-    off_sq = 0.0
-    for n in range(len(begin)):
-        off_sq += (vertex[i, n] - begin[n] - x * (end[n] - begin[n])) ** 2
-    return _within(x, off_sq, length_sq, radius)
-
-
-@kernel(inline=True)
-def out_of_reach(pieces: ProgramPieces, first: int, last: int, ends: FloatArray) -> bool:
-    """Whether the chord between `ends` (2, A) is out of reach of one of the vertices from `first` to `last`."""
-    over = 0.0
-    for i in range(first, last + 1):
-        over = max(over, reach_chord(ends[0], ends[1], pieces, i, 0.0)[2] - pieces.joint[i]["budget"])
-    return over > 0.0
-
-
-@kernel(inline=True)
-def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[float, float, float]:
-    """The part of a segment within `radius` of a point whose foot on its line is at the fraction x, off_sq
-    away (squared)."""
+    for n in range(len(q)):
+        off_sq += (q[n] - begin[n] - x * (end[n] - begin[n])) ** 2
     nearest = min(max(x, 0.0), 1.0)
     distance = math.sqrt(off_sq + (x - nearest) ** 2 * length_sq)
     if distance > radius:
@@ -213,15 +179,23 @@ def _within(x: float, off_sq: float, length_sq: float, radius: float) -> tuple[f
     return min(max(x - half, 0.0), nearest), max(min(x + half, 1.0), nearest), distance
 
 
+@kernel(inline=True)
+def out_of_reach(pieces, first, last, ends):
+    """Whether the chord between `ends` (2, A) is out of reach of one of the vertices from `first` to `last`."""
+    over = 0.0
+    for i in range(first, last + 1):
+        over = max(over, reach_chord(ends[0], ends[1], pieces, i, 0.0)[2] - pieces.joint[i]["budget"])
+    return over > 0.0
+
+
 def both_apart(
     pieces: ProgramPieces, piece: Array, position: FloatArray, axes: tuple[str, ...]
 ) -> FloatArray:
     """(2,) largest distance of linear, and of rotary axes from the path [mm]; zeros without both kinds.
 
-    The contour error is one of all axes in one norm, angles at a radius. Its vector, from the nearest point
-    of the path to the motion, has a part in the linear axes, the error of the tip where the kinematics carry
-    it there, and one in the rotary axes, of which the tool's direction turns by no more. Neither exceeds the
-    whole, so that a motion within the tolerance keeps both tolerances.
+    The vector from the nearest point of the path to the motion has a part in the linear axes, the error of the tip where
+    the kinematics carry it there, and one in the rotary axes, of which the tool's direction turns by no more. Neither
+    exceeds the contour error, the norm of both.
 
     piece    : (n,) the piece that each sample lies on
     position : (n, A) of the samples [mm]
@@ -234,7 +208,7 @@ def both_apart(
 
 
 @kernel()
-def _largest_apart(pieces: ProgramPieces, piece: Array, position: FloatArray, counts: FloatArray) -> float:
+def _largest_apart(pieces, piece, position, counts):
     """Largest square of the distance of samples from their nearest points, in the axes that count (A,)."""
     largest, vertex = 0.0, pieces.vertex
     for k in range(len(piece)):

@@ -1,10 +1,8 @@
 """One reading of a motion: its delivered samples and, in step with them, what lies between.
 
-Where the judge looks between the samples: at times of its own, which nobody can prepare for.
-
 A planned motion can be asked at any time. Its pieces, on which everything is smooth, and the periods of the
 machine are cut into cells, and every cell is looked at once, at a time drawn at random from a generator with
-a fixed seed:
+a fixed seed, which nobody can prepare for:
 
     every piece    at least `PER_PIECE` cells: more than the three places at which the planner looks at a piece itself
     every period   at least `PER_PERIOD` cells, whatever the pieces are said to be, and as many as keep the chords between
@@ -20,14 +18,12 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Iterator
-from typing import Protocol
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import AnyMotion, Trajectory
 from planner.verifier.excess import Fault, Kind
 from planner.verifier.findings import measured
 from planner.verifier.given import Given
@@ -45,8 +41,7 @@ CHORDS = 2, False  # a chord is matched with its middle
 class Reader:
     """Reads a trajectory, and the motion it was taken from, from start to end, as often as it is asked to.
 
-    trajectory : the delivered samples, which are looked at chunk by chunk
-    motion     : what they were taken from; None to read the samples alone
+    motion     : None to read the samples alone
     dt, cells  : the machine's period [s], and into how many cells it is divided (`motion_between`)
     delivered  : what is kept of the samples of the last reading
     comparison : of samples and motion; None without a motion
@@ -67,32 +62,24 @@ class Reader:
     ):
         self.trajectory, self.motion, self.limits, self.given = trajectory, motion, limits, given
         self._times, self._way = (dt, seed, cells), between
-        self.delivered = self._delivered()
+        self.delivered = Delivered(trajectory.dt, given)
         self.comparison = None if motion is None else Comparison(trajectory.axes, motion.end)
-
-    def _delivered(self) -> Delivered:
-        dt = self.trajectory.dt
-        return Delivered(dt, self.given, max(dt, self._times[0]) if self.motion is None else None)
 
     def read(
         self, pieces: ProgramPieces, progress: Callable[[float], None] = lambda done: None
     ) -> list[Observed]:
         """The findings of both beside a path; `progress` is called with the fraction done."""
-        self.delivered = self._delivered()
-        parts, cubic = self._way
+        dt, (parts, cubic) = self.trajectory.dt, self._way
+        self.delivered = Delivered(dt, self.given, max(dt, self._times[0]) if self.motion is None else None)
         seen = Watch(pieces, self.limits, parts=parts, cubic=cubic)
         samples = self.trajectory.chunks()
         between = None if self.motion is None else self._between(pieces, seen, samples, progress)
         for chunk in samples:
             self._take(seen, chunk)
             progress(seen.seen.samples / len(self.trajectory))
-        seen.finish()
-        readings = [seen.seen]
-        if between is not None:
-            between.finish()
-        if between is not None and between.seen.samples:
-            readings.append(between.seen)
-        return readings
+        for watch in [seen] if between is None else [seen, between]:
+            watch.finish()
+        return [seen.seen] if between is None or not between.seen.samples else [seen.seen, between.seen]
 
     def _between(
         self,
@@ -105,9 +92,8 @@ class Reader:
         one before is read, and the samples beside it. What is seen does not depend on the threads."""
         assert self.motion is not None
         assert self.comparison is not None
-        between = Watch(
-            pieces, self.limits, parts=1, edges=np.asarray(self.motion.t), note="between the samples"
-        )
+        edges = np.asarray(self.motion.t)
+        between = Watch(pieces, self.limits, parts=1, edges=edges, note="between the samples")
         self.comparison.begin()
         parts = motion_between(self.motion, *self._times)
         part = next(parts, None)
@@ -130,10 +116,7 @@ class Reader:
 
     def _catch_up(self, seen: Watch, samples: Iterator[Trajectory], part: Trajectory) -> None:
         """Read the samples as far as a part of the motion goes."""
-        while seen.seen.t_last < part.t[-1]:
-            chunk = next(samples, None)
-            if chunk is None:
-                break
+        while seen.seen.t_last < part.t[-1] and (chunk := next(samples, None)) is not None:
             self._take(seen, chunk)
 
     def _take(self, seen: Watch, chunk: Trajectory) -> None:
@@ -208,24 +191,6 @@ PER_PERIOD = 2  # cells: chords between neighbouring times last less than a peri
 BOW, MOST_PER_PERIOD = 0.01, 16  # [share of the tolerance]; cells, where axes are strong enough for anything
 SHORTEST_PIECE = 1e-9  # [s] shorter ones are not looked at: 1 m/s moves by the rounding of a position in it
 CELLS = SIZES.places_at_once
-
-
-class AnyMotion(Protocol):
-    """A motion that can be asked at any time."""
-
-    @property
-    def t(self) -> FloatArray:
-        """(L,) start of each piece on which everything is smooth [s], non-decreasing."""
-        ...
-
-    @property
-    def end(self) -> float:
-        """End of the motion [s]; it begins at 0."""
-        ...
-
-    def at(self, times: FloatArray, dt: float) -> Trajectory:
-        """The motion at increasing times (T,) [s]; `dt` [s] is the interpolation period of the record."""
-        ...
 
 
 def cells_per_period(dt: float, tolerance: float, acceleration: float) -> int:

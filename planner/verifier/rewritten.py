@@ -90,17 +90,14 @@ def _difference(one: Toolpath, mine: _Runs, other: Toolpath, theirs: _Runs) -> t
     a, b = mine.first[:count], theirs.first[:count]
     last_a, last_b = mine.first[1 : count + 1] - 1, theirs.first[1 : count + 1] - 1
     ends = [np.abs(one.start[a] - other.start[b]), np.abs(one.end[last_a] - other.end[last_b])]
-    bad_mode = np.logical_not(
-        np.isclose(mine.mode[:count], theirs.mode[:count], rtol=RATIO_ROUNDING, atol=0.0)
-    )
+    bad_mode = ~np.isclose(mine.mode[:count], theirs.mode[:count], rtol=RATIO_ROUNDING, atol=0.0)
     bent = mine.mode[:count, -1] > 0
     shape = np.zeros(count, dtype=bool)
     rows, same = one.curve[a[bent]], other.curve[b[bent]]
     if bent.any() and not bad_mode[:, -1].any():
         gap = np.abs(one.curves.points[rows] - other.curves.points[same]).max(axis=(1, 2))
-        shape[bent] = (gap > PLACE_ROUNDING) | (one.curves.weight[rows] != other.curves.weight[same]).any(
-            axis=1
-        )
+        unlike = one.curves.weight[rows] != other.curves.weight[same]
+        shape[bent] = (gap > PLACE_ROUNDING) | unlike.any(axis=1)
     for bad, what in (
         (bad_mode.any(axis=1), "feed, mode or standstill differs"),
         ((np.maximum(*ends) > PLACE_ROUNDING).any(axis=1), "a run begins or ends elsewhere"),
@@ -130,11 +127,7 @@ def _chords(path: Toolpath, runs: _Runs, k: int, flat: float) -> FloatArray:
             x: FloatArray = np.linspace(0.0, float(path.length[i]), max(pieces, 1) + 1)[1:-1]
             frame = np.stack([arcs.center[row], arcs.e1[row], arcs.e2[row], arcs.drift[row]])
             circle = np.array([arcs.radius[row], arcs.rate[row]])
-            parts.append(
-                arc_points(
-                    np.broadcast_to(frame, (len(x), *frame.shape)), np.broadcast_to(circle, (len(x), 2)), x
-                )
-            )
+            parts.append(arc_points(frame[None], circle[None], x))
         parts.append(path.end[i : i + 1])
     points: FloatArray = np.vstack(parts)
     return points
@@ -150,15 +143,12 @@ def _least(a: FloatArray, b: FloatArray, low: float, high: float, fine: float) -
         return math.inf
     while high - low > fine:
         middle = 0.5 * (low + high)
-        if _reaches(a, b, middle, *ranges):
-            high = middle
-        else:
-            low = middle
+        low, high = (low, middle) if _reaches(a, b, middle, *ranges) else (middle, high)
     return high
 
 
 @kernel()
-def _reaches(a: FloatArray, b: FloatArray, within: float, left: FloatArray, new: FloatArray) -> bool:
+def _reaches(a, b, within, left, new):
     """Whether two polylines (n+1, A), (m+1, A) can be run through side by side within a distance.
 
     left, new : (m+1, 2) to work in: the part of each edge of b that is reached beside a vertex of a, empty
@@ -208,7 +198,7 @@ def _reaches(a: FloatArray, b: FloatArray, within: float, left: FloatArray, new:
 
 
 @kernel(inline=True)
-def _part(line: FloatArray, edge: int, other: FloatArray, vertex: int, within: float) -> tuple[float, float]:
+def _part(line, edge, other, vertex, within):
     """The part of an edge of a polyline that is within a distance of a vertex of another: from 0 to 1, a lower
     end above the upper one for none. The ends of the edge count by themselves: 0 and 1 without rounding."""
     along, square, off, size, tail = 0.0, 0.0, 0.0, 0.0, 0.0

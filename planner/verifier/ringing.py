@@ -88,9 +88,7 @@ def _ringing(mode: Mode, state: FloatArray, axes: tuple[str, ...]) -> Ringing:
 
 
 @kernel()
-def _shake(
-    t: FloatArray, position: FloatArray, velocity: FloatArray, w: float, damping: float, state: FloatArray
-) -> None:
+def _shake(t, position, velocity, w, damping, state):
     """Go on from the first sample, where each axis is in its `state` (A, `STATE`), to the last."""
     turn = w * math.sqrt(1.0 - damping * damping)
     decay = -damping * w

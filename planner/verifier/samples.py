@@ -20,8 +20,7 @@ would pass: the quantity cannot be judged by the positions.
 Rest. A motion that rests at its first and last sample has run, over the period h next to it, per axis at most
 a h^2 / 2, and j h^3 / 6 where jerk is limited; its velocity is zero there, and with limited jerk its
 acceleration too. Where a program asks for a speed at an end, the same holds of what the motion runs beside that.
-A file whose last samples are missing shows that here, although its end may be as near to the program's as the
-tolerance asks.
+A file whose last samples are missing shows that here.
 
 Seconds. No program takes 200 times as long as at its feed, but for times in milliseconds or less.
 """
@@ -37,8 +36,8 @@ from planner.verifier.excess import Fault, Kind
 from planner.verifier.findings import measured
 from planner.verifier.given import DERIVATIVES, Given
 from planner.verifier.limits import ACCELERATION, JERK
+from planner.verifier.matching import STILL
 from planner.verifier.pieces import PERIOD_ROUNDING, RATIO_ROUNDING
-from planner.verifier.stops import STILL
 from planner.verifier.stream import Observed
 from planner.verifier.worst import ROUNDING_ULPS, Limits
 
@@ -115,10 +114,8 @@ class Delivered:
         if not self._wrong:
             return []
         time, period = self._first
-        found = (
-            f"{period:.9g} s between the samples at t = {time:.6g} s and the next, dt is {self.dt:.9g} s "
-            f"({self._wrong} such periods)"
-        )
+        found = f"{period:.9g} s between the samples at t = {time:.6g} s and the next, dt is {self.dt:.9g} s "
+        found += f"({self._wrong} such periods)"
         return [Fault(Kind.SAMPLES, "period", found, ratio=period / self.dt, time=time)]
 
 
@@ -155,23 +152,20 @@ def digits(
     if not (limits.rounding.any() or given.time_rounding):
         return [], []
     h, axes = trajectory.dt, trajectory.axes
-    speed = np.abs(np.diff(trajectory.position, axis=0) / np.diff(trajectory.t)[:, None]).max(
-        axis=0, initial=0.0
-    )
-    error = limits.rounding + speed * given.time_rounding
+    speeds = np.abs(np.diff(trajectory.position, axis=0) / np.diff(trajectory.t)[:, None])
+    error = limits.rounding + speeds.max(axis=0, initial=0.0) * given.time_rounding
     faults, shares = [], []
     for order, quantity in enumerate(DERIVATIVES, start=1):
         share = 2.0**order * error / h**order / limits.per_axis[order - 1]
         k = int(share.argmax())
-        shares.append(f"{quantity}.{axes[k]} to {100 * share[k]:.2g} % of its limit")
+        if share[k] >= WORTH_A_WORD:
+            shares.append(f"{quantity}.{axes[k]} to {100 * share[k]:.2g} % of its limit")
         if share[k] >= 1.0 and quantity not in given.columns and quantity not in not_limited:
             found = (
                 f"too few digits to judge {quantity}.{axes[k]}: positions good to {error[k]:.2g} mm every {h:g} s leave it "
                 f"unknown to {share[k]:.3g} times its limit; write more digits, or report it unjudged: --not-limited {quantity}"
             )
             faults.append(Fault(Kind.DIGITS, "samples", found))
-        if share[k] < WORTH_A_WORD:
-            shares.pop()
     if not shares:
         return faults, []
     said = f"positions are written to {error.max():.2g} mm"
@@ -201,19 +195,22 @@ def rest_faults(
         over = moved - furthest * (1.0 + RATIO_ROUNDING) - 2.0 * (rounding + limits.rounding)
         k = int(over.argmax())
         if over[k] > 0:
+            more = "more or less " if asked.any() else ""
             found = (
-                f"{wrong}: {axes[k]} moves by {moved[k]:.4g} mm {'more or less ' if asked.any() else ''}in the period of {h:.4g} s "
-                f"next to it, {furthest[k]:.4g} mm are possible{advice}"
+                f"{wrong}: {axes[k]} moves by {moved[k]:.4g} mm {more}in the period of {h:.4g} s next to it, "
             )
+            found += f"{furthest[k]:.4g} mm are possible{advice}"
             said.append(Fault(Kind.SAMPLES, name, found, time=float(t[at])))
-        for quantity, row in (("velocity", 0), ("acceleration", 1)):
-            value: FloatArray = np.abs(delivered.ends[quantity][at] - (asked if row == 0 else 0.0))
-            allowed = RATIO_ROUNDING * limits.per_axis[row] + (
-                SPEED_ROUNDING * np.abs(asked) if row == 0 else 0.0
-            )
+        columns = (
+            [("velocity", asked), ("acceleration", 0.0 * asked)]
+            if limits.jerk_limited
+            else [("velocity", asked)]
+        )
+        for (quantity, wanted), limit in zip(columns, limits.per_axis, strict=False):
+            seen = delivered.ends[quantity][at]
+            value, allowed = np.abs(seen - wanted), RATIO_ROUNDING * limit + SPEED_ROUNDING * np.abs(wanted)
             k = int((value / allowed).argmax())
-            judged = quantity in given.columns and (row == 0 or limits.jerk_limited)
-            if judged and value[k] > allowed[k]:
-                found = f"{wrong}: {quantity}.{axes[k]} is {delivered.ends[quantity][at, k]:.4g} at t = {t[at]:.6g} s{advice}"
+            if quantity in given.columns and value[k] > allowed[k]:
+                found = f"{wrong}: {quantity}.{axes[k]} is {seen[k]:.4g} at t = {t[at]:.6g} s{advice}"
                 said.append(Fault(Kind.SAMPLES, name, found, time=float(t[at])))
     return said

@@ -19,26 +19,21 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.motion.trajectory import Trajectory
 from planner.verifier.excess import Fault, first_of
-from planner.verifier.findings import joint_times
-from planner.verifier.pieces import CONTOUR_ROUNDING, ProgramPieces
-from planner.verifier.stream import Observed
+from planner.verifier.pieces import CONTOUR_ROUNDING
 from planner.verifier.verdict import ThreadCheck
 
 MORE = 0.02  # of d, by which a plan on a grid may take longer [-]
 
 
 def thread_checks(
-    trajectory: Trajectory,
-    readings: list[Observed],
-    toolpath: Toolpath,
-    pieces: ProgramPieces,
-    machine: Machine,
+    trajectory: Trajectory, passed: FloatArray, toolpath: Toolpath, machine: Machine
 ) -> tuple[ThreadCheck, ...]:
-    """How far each move in step with the spindle is out of step, in the order of the program."""
+    """How far each move in step with the spindle is out of step, in the order of the program; passed (M+1,): when the
+    motion passes the joints of the path [s]."""
     held = np.flatnonzero(toolpath.held)
     if not len(held):
         return ()
-    off = _out_of_step(trajectory, readings[0], toolpath, pieces, held, room_of(toolpath, machine, held))
+    off = _out_of_step(trajectory, passed, toolpath, held, room_of(toolpath, machine, held))
     allowed = np.minimum(toolpath.tolerance[held], toolpath.tolerance[held + 1])
     columns = (column.tolist() for column in (toolpath.line[held], toolpath.feed[held], off, allowed))
     rows = zip(*columns, strict=True)
@@ -62,15 +57,9 @@ def room_of(toolpath: Toolpath, machine: Machine, held: Array) -> FloatArray:
 
 
 def _out_of_step(
-    trajectory: Trajectory,
-    reading: Observed,
-    toolpath: Toolpath,
-    pieces: ProgramPieces,
-    held: Array,
-    room: FloatArray,
+    trajectory: Trajectory, passed: FloatArray, toolpath: Toolpath, held: Array, room: FloatArray
 ) -> FloatArray:
     """(H,) largest |s - F t - c| of the moves `held` (H,) [mm]; 0 without samples behind the run-in."""
-    passed = joint_times(reading, pieces)
     begin, end = passed[held], passed[held + 1]
     length, feed, start = toolpath.length[held], toolpath.feed[held], toolpath.start[held]
     direction = (toolpath.end[held] - start) / length[:, None]

@@ -9,21 +9,27 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.base.sizes import SIZES
 from planner.motion.trajectory import Trajectory, joined
-from planner.verifier.between import UNKNOWN, look_between, nothing_between
+from planner.verifier.between import UNKNOWN, Between, look_between
 from planner.verifier.feed import Feeds
 from planner.verifier.given import DERIVATIVES
 from planner.verifier.kernel import kernel
-from planner.verifier.limits import FEED, GROUPS, ROWS_ALONE, look_at_axes, rows_of
-from planner.verifier.matching import SEARCH_MAX, SEARCHED, Located, Match, match_samples, new_match, nowhere
+from planner.verifier.limits import FEED, GROUPS, look_at_axes, rows_of
+from planner.verifier.matching import (
+    SEARCH_MAX,
+    SEARCHED,
+    AtStop,
+    Located,
+    Match,
+    match_samples,
+    new_match,
+    nowhere,
+)
+from planner.verifier.other_limits import look_at_power, look_at_tangential, look_at_user_limits
 from planner.verifier.passing import Bounds, Chords
 from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
-from planner.verifier.power import look_at_power
-from planner.verifier.stops import AtStop
-from planner.verifier.tangential import look_at_tangential
-from planner.verifier.user_limits import look_at_user_limits
 from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst, state_of
 
 BLOCK_SAMPLES = SIZES.judged_at_once
@@ -115,31 +121,26 @@ class Watch:
         both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
         seen.apart = np.maximum(seen.apart, both)
         block = SampleBlock(t=t, state=state, piece=place.piece, skip=skip, travelled=self._travelled)
+        speed, none = np.full(len(t), np.nan), np.zeros_like(t)
+        if limits.judged[0]:
+            v = np.asfortranarray(block.velocity)
+            speed = np.sqrt(np.einsum("na,na->n", v, v))
         if self._edges is None:
             self._travelled = look_at_axes(block, limits, seen.worst)
             known, cut = position[:, None], np.full(len(t), np.nan)
         else:
             known, cut = state, self._take_between(block, self._edges, place)
-        self._take_feeds(block, place, cut, known)
-        look_at_tangential(block, limits, seen.worst)
-        power = GROUPS * len(limits.axes) + ROWS_ALONE
-        look_at_power(block, limits, seen.worst, power)
-        look_at_user_limits(block, limits, seen.worst, power + len(limits.axes))
-
-    def _take_feeds(self, block: SampleBlock, place: Located, cut: FloatArray, state: FloatArray) -> None:
-        t, speed = block.t, np.full(len(block.t), np.nan)
-        if self._limits.judged[0]:
-            v = np.asfortranarray(block.velocity)
-            speed = np.sqrt(np.einsum("na,na->n", v, v))
-        none, (piece, _, first, last) = np.zeros_like(t), place
-        chords = Chords(t, none, none.copy(), speed, piece, first, last, cut, state)
-        self._feeds.take(chords, block.skip)
+        piece, _, first, last = place
+        self._feeds.take(Chords(t, none, none.copy(), speed, piece, first, last, cut, known), skip)
+        for look in (look_at_tangential, look_at_power, look_at_user_limits):
+            look(block, limits, seen.worst)
 
     def _take_between(self, block: SampleBlock, edges: FloatArray, place: Located) -> FloatArray:
         """Take in a block of a motion and what lies between its times. -> (n,) as `Between.cut`"""
         limits, worst, skip = self._limits, self.seen.worst, block.skip
         axes = len(limits.axes)
-        found = nothing_between(len(block.t), axes)
+        n = len(block.t)
+        found = Between(np.zeros((n, axes)), np.zeros((n, axes)), np.zeros(n), np.full(n, np.nan))
         edge = int(np.searchsorted(edges, block.t[max(skip - 1, 0)], "right"))
         unknown = self.seen.known[UNKNOWN]
         bounds = limits.per_axis + np.array([[0.0], [0.0], [0.0 if limits.jerk_limited else np.inf]])
@@ -171,15 +172,12 @@ def overlapping(trajectory: Trajectory, carried: int) -> Iterator[Trajectory]:
         before = whole.rows(np.arange(max(len(whole) - carried, 0), len(whole)))
 
 
-Each = Callable[[FloatArray, FloatArray, Located], None]
-
-
 def follow(
     parts: Iterable[tuple[FloatArray, FloatArray]],
     pieces: ProgramPieces,
     note: str = "",
     *,
-    each: Each | None = None,
+    each: Callable[[FloatArray, FloatArray, Located], None] | None = None,
     search: bool = True,
 ) -> Observed:
     """Match a motion with a path.
@@ -210,7 +208,7 @@ def follow(
 
 
 @kernel()
-def _ratios(pieces: ProgramPieces, piece: Array, position: FloatArray, ratio: FloatArray) -> None:
+def _ratios(pieces, piece, position, ratio):
     """Distance of each position from its piece over the piece's budget, into `ratio` (n,)."""
     for k in range(len(piece)):
         _, _, distance = reach_piece(pieces, piece[k], position[k], 0.0)

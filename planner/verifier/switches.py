@@ -90,7 +90,7 @@ class Switches:
 
 
 @kernel()
-def _passed(pieces: ProgramPieces, found: Passing, new: Chords, skip: int, bounds: Bounds) -> int:
+def _passed(pieces, found, new, skip, bounds):
     """Take in the chords to the samples from `skip` on, and settle the vertices that they leave behind;
     places and errors into `new`. -> the first sample there was no room for, or their number"""
     switch, state, along = found.switch, found.state, found.along
@@ -133,15 +133,7 @@ def _put_ends(ends, new, k):
 
 
 @kernel(inline=True)
-def _look(
-    pieces: ProgramPieces,
-    found: Passing,
-    new: Chords,
-    k: int,
-    last: int,
-    chord: tuple[float, float, float, float, float],
-    bounds: Bounds,
-) -> None:
+def _look(pieces, found, new, k, last, chord, bounds):
     """Which vertices, from the open one to `last`, the chord to sample k is a better place for."""
     switch, state, along = found.switch, found.state, found.along
     first, at = max(state[OPEN], state[PASSED] + 1), state[TAIL]
@@ -190,7 +182,7 @@ def _latest(found, i, at):
 
 
 @kernel()
-def _settle(pieces: ProgramPieces, found: Passing, bounds: Bounds) -> None:
+def _settle(pieces, found, bounds):
     """Settle the vertices that are passed, up to the first one of which the place still depends on how the motion goes on; what has
     been judged stays.
 
@@ -238,7 +230,7 @@ def _begin(found, i):
 
 
 @kernel()
-def _keep(found: Passing, first: int, last: int, top: int) -> None:
+def _keep(found, first, last, top):
     """The vertices from `first` to `last` are settled, those up to `top` not yet."""
     switch, state, along = found.switch, found.state, found.along
     for i in range(first, last + 1):
@@ -257,7 +249,7 @@ def _keep(found: Passing, first: int, last: int, top: int) -> None:
 
 
 @kernel()
-def _pool(pieces: ProgramPieces, found: Passing, first: int, i: int, bounds: Bounds) -> None:
+def _pool(pieces, found, first, i, bounds):
     """Vertices from `first` on whose nearest places are not in order, i the last of them, are passed together,
     where the motion is nearest to the mean of them, within reach of all; of chords that is known to two of them.
     How well single places are known does not matter on cubics: they are ends of chords where they are out of order."""

@@ -41,20 +41,12 @@ class Worst:
     """
 
     def __init__(self, names: Sequence[tuple[str, str]], axes: int):
-        count = len(names)
-        self.names = tuple(names)
+        self.names, self.over, count = tuple(names), Spans(), len(names)
         self.row, self.time, self.at = np.zeros((count, 4)), np.zeros(count), np.zeros((count, axes))
         self.piece, self.least = np.zeros(count, dtype=np.int64), np.full(count, np.inf)
-        self.over = Spans()
 
     def take(
-        self,
-        first: int,
-        value: FloatArray,
-        limit: FloatArray | float,
-        how: int,
-        block: SampleBlock,
-        span: int | None = None,
+        self, first: int, value: FloatArray, limit: Any, how: int, block: SampleBlock, span: int = -1
     ) -> None:
         """Take in samples of the quantities `first`, `first` + 1, ... of a block.
 
@@ -73,7 +65,7 @@ class Worst:
                 at = block.skip + n
                 seen = float(ratio[n, k]), float(value[at, k]), float(limit[at, k]), how
                 self.keep(first + k, seen, float(block.t[at]), block.position[at], int(block.piece[at]))
-        if span is not None and most > 1.0:
+        if span >= 0 and most > 1.0:
             self.exceeded(span, value / limit, block)
 
     def exceeded(self, span: int, ratio: FloatArray, block: SampleBlock) -> None:
@@ -87,9 +79,7 @@ class Worst:
         rows = slice(first, first + np.size(limit))
         self.least[rows] = np.minimum(self.least[rows], limit)
 
-    def keep(
-        self, row: int, seen: tuple[float, float, float, int], time: float, at: FloatArray, piece: int
-    ) -> None:
+    def keep(self, row: int, seen: tuple[float, ...], time: float, at: FloatArray, piece: int) -> None:
         """Ratio, value, limit and how it was `seen` are now the worst of a quantity, there: at (A,) [mm]."""
         self.row[row], self.time[row], self.at[row], self.piece[row] = seen, time, at, piece
 
@@ -117,19 +107,14 @@ def differences(
     turn   : what values may jump by because they start again; None if they do not
     """
     found, off = values, error
-    every: list[tuple[FloatArray, FloatArray]] = []
-    for order in (1, 2, 3):
-        value, wrong = np.zeros_like(values), np.zeros_like(values)
-        if len(found) > 1:
-            over = (order / (t[order:] - t[:-order]))[:, None]
-            step = np.diff(found, axis=0)
-            if order == 1 and turn is not None:
-                step = step - turn * np.round(step / turn)
-            found, off = over * step, over * (off[1:] + off[:-1])
-            value[order:], wrong[order:] = found, off
-        else:
-            found = found[:0]
-        every.append((value, wrong))
+    every = [(np.zeros_like(values), np.zeros_like(values)) for _ in range(3)]
+    for order in range(1, min(len(values), 4)):
+        over = (order / (t[order:] - t[:-order]))[:, None]
+        step = np.diff(found, axis=0)
+        if order == 1 and turn is not None:
+            step = step - turn * np.round(step / turn)
+        found, off = over * step, over * (off[1:] + off[:-1])
+        every[order - 1][0][order:], every[order - 1][1][order:] = found, off
     return every
 
 
@@ -154,7 +139,7 @@ class Limits:
     power_unit: FloatArray  # (A,) of them in 1 mm2/s3
     acceleration_at_stop: FloatArray  # (A,) inf where acceleration is not limited [mm/s2]
     jerk_limited: bool
-    user: tuple[Any, ...] = ()  # the user's limits (user_limits.py)
+    user: tuple[Any, ...] = ()  # the user's limits (other_limits.py)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

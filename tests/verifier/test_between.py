@@ -11,7 +11,7 @@ import planner
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
 from planner.verifier import Known, verify
-from planner.verifier.between import OPEN, PARTS, UNKNOWN, look_between, nothing_between
+from planner.verifier.between import OPEN, PARTS, UNKNOWN, Between, look_between
 from planner.verifier.pieces import program_pieces
 
 M = machine()
@@ -70,7 +70,8 @@ def cubics(seed, **more):
 
 def looked(motion, t, limits=FREE):
     pieces = program_pieces(Moves().line(1e3).toolpath(M))
-    found, known = nothing_between(len(t), 3), np.zeros(3)
+    velocity, acceleration = np.zeros((2, len(t), 3))
+    found, known = Between(velocity, acceleration, np.zeros(len(t)), np.full(len(t), np.nan)), np.zeros(3)
     columns, piece = motion.columns(t), np.zeros(len(t), dtype=np.int64)
     state = np.ascontiguousarray(columns.transpose(1, 0, 2))
     look_between(t, state, motion.t, 1, limits, 0, pieces, piece, np.empty((3, 3)), found, known)

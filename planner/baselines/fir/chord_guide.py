@@ -16,7 +16,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.baselines.fir.command import lower_between
-from planner.baselines.fir.guide import Guide, per_leg, picked
+from planner.baselines.fir.guide import Guide, per, picked
 from planner.corners.elements import ElementIntervals, element_point, to_arc_length
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.machine import Machine
@@ -33,17 +33,17 @@ STRAIGHT = 1e-12  # a curvature below this is rounding [1/mm]
 class ChordGuide(Guide):
     """The chords of a smooth path, with what paper 001's formulas need of each."""
 
-    feed: FloatArray = per_leg(finite=False)
-    programmed: FloatArray = per_leg(finite=False)  # (R,) programmed feed, inf for rapids [mm/s]
-    kappa: FloatArray = per_leg()  # (R,) largest curvature of the path at the chord [1/mm]
+    feed: FloatArray = per("leg", finite=False)
+    programmed: FloatArray = per("leg", finite=False)  # (R,) programmed feed, inf for rapids [mm/s]
+    kappa: FloatArray = per("leg")  # (R,) largest curvature of the path at the chord [1/mm]
     # (R,) speed that the axes' accelerations allow on a circle of it [mm/s] (par. 13); inf if straight
-    v_acc: FloatArray = per_leg(finite=False)
-    v_jerk: FloatArray = per_leg(finite=False)  # (R,) the same for their jerks (par. 17)
-    tol: FloatArray = per_leg()  # (R,) what filters and interpolation may use of the tolerance [mm]
-    corner: Array = per_leg(np.int64)  # (R,) joint whose corner the chord belongs to, ascending, or -1
-    sin_half: FloatArray = per_leg()  # (R,) sine of half the turning angle there [-]
-    whole: FloatArray = per_leg()  # (R,) tolerance, with what the rounding uses of it [mm]
-    segment: Array = per_leg(np.int64)  # (R,) segment of the toolpath
+    v_acc: FloatArray = per("leg", finite=False)
+    v_jerk: FloatArray = per("leg", finite=False)  # (R,) the same for their jerks (par. 17)
+    tol: FloatArray = per("leg")  # (R,) what filters and interpolation may use of the tolerance [mm]
+    corner: Array = per("leg", np.int64)  # (R,) joint whose corner the chord belongs to, ascending, or -1
+    sin_half: FloatArray = per("leg")  # (R,) sine of half the turning angle there [-]
+    whole: FloatArray = per("leg")  # (R,) tolerance, with what the rounding uses of it [mm]
+    segment: Array = per("leg", np.int64)  # (R,) segment of the toolpath
 
     @property
     def budget(self) -> FloatArray:
@@ -52,11 +52,8 @@ class ChordGuide(Guide):
 
 
 def cut_beside_slower(guide: ChordGuide) -> ChordGuide:
-    """The same guide with its chords cut beside feeds that are lower than theirs.
-
-    Filters make a lower feed hold on there (`feeds_held`), and a long chord should not have to as a whole: it
-    is cut at the lengths that the lower feed runs in the times `CUTS`.
-    """
+    """The same guide with its chords cut beside feeds that are lower than theirs, at the lengths that these run in the
+    times `CUTS`: filters make the lower feed hold on there (`feeds_held`), and a long chord should not as a whole."""
     change = np.flatnonzero((guide.programmed[1:] != guide.programmed[:-1]) & guide.inner[1:-1]) + 1
     before, after = guide.programmed[change - 1], guide.programmed[change]
     beside = np.where(before < after, before, -after)[:, None] * CUTS
@@ -101,11 +98,7 @@ def feeds_held(guide: ChordGuide, T1: FloatArray, T2: FloatArray) -> FloatArray:
 def guide_of_path(
     samples: PathSamples, machine: Machine, profile_filters: tuple[float, float] | None = None
 ) -> ChordGuide:
-    """The chords of a smooth path, cut beside lower feeds too (`cut_beside_slower`).
-
-    samples : the path on a grid
-    profile_filters : lengths of the two filters [s]; None to choose them
-    """
+    """The chords of a smooth path, cut beside lower feeds too (`cut_beside_slower`); `profile_filters` as of `Guide`."""
     path, segment = samples.path, samples.segment
     toolpath = path.toolpath
     corner = np.where(samples.element < 0, ~samples.element, -1)

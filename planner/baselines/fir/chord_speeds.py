@@ -4,8 +4,7 @@ The command runs the guide's chords one after another at a constant speed each.
 
 What is exceeded is mended where it comes from:
 
-* error          the chords that turn, around the one that was commanded Td/2 before, get slower; a corner's then last as long as the
-                 gap that paper 000 leaves between two pulses;
+* error          the chords that turn, around the one that was commanded Td/2 before, get slower;
 * acceleration   T1 gets longer, up to 2 V/A: whatever the command, |a| <= 2 V/T1 (docs/papers.md, universal identity);
 * jerk           T1 T2 gets larger, up to 4 V/J: |j| <= 4 V/(T1 T2);
 * feed           a lower programmed feed holds on beside its block, for as long as the filters see it (`feeds_held`).
@@ -45,7 +44,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.chord_guide import STRAIGHT, ChordGuide, feeds_held
 from planner.baselines.fir.command import Command, VelocityPulses, command_of
-from planner.baselines.fir.guide import per_leg, per_run
+from planner.baselines.fir.guide import per
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import BEYOND, Made, SpeedPlan, settled_fastest, slowing
 from planner.corners.fir import overlap_time
@@ -71,8 +70,10 @@ class ChordSpeeds(SpeedPlan):
     """Speeds on the R chords of a guide in S runs."""
 
     guide: ChordGuide
-    v: FloatArray = per_leg()  # (R,) constant speed of each chord [mm/s]
-    margin: FloatArray = per_run(2)  # (S, 2) how much longer than for an isolated step T1 and T1 T2 are [-]
+    v: FloatArray = per("leg")  # (R,) constant speed of each chord [mm/s]
+    margin: FloatArray = per(
+        "run", width=(2,)
+    )  # (S, 2) how much longer than for an isolated step T1 and T1 T2 are [-]
 
     def time(self) -> FloatArray:
         """(S,) durations of the runs [s], dwells not counted."""
@@ -80,16 +81,13 @@ class ChordSpeeds(SpeedPlan):
 
     def command(self) -> Command:
         """All chords at their speeds, one after another, no gaps between them."""
-        guide = self.guide
-        pulses = VelocityPulses(leg=np.arange(len(guide)), length=guide.length, speed=self.v)
-        return command_of(guide, pulses, np.zeros(len(guide) + 1), self.T1, self.T2)
+        legs = len(self.guide)
+        pulses = VelocityPulses(leg=np.arange(legs), length=self.guide.length, speed=self.v)
+        return command_of(self.guide, pulses, np.zeros(legs + 1), self.T1, self.T2)
 
     def slower(self, made: Made, machine: Machine, n: int) -> ChordSpeeds:
-        """Slower speeds and longer filters for what the motion exceeds (module text).
-
-        made : the motion of this plan
-        n    : rounds before this one; from `PATIENCE` on everything gets slower
-        """
+        """Slower speeds and longer filters for what the motion exceeds (module text); from `PATIENCE` on everything
+        gets slower."""
         guide, given = self.guide, self.guide.profile_filters is not None
         over = np.stack([made.largest(made.seen.acceleration), made.largest(made.seen.jerk)], axis=1)
         everything = (over > 1.0).any(axis=1) if given else np.full(guide.runs, n >= PATIENCE)
@@ -101,28 +99,23 @@ class ChordSpeeds(SpeedPlan):
         if n >= PATIENCE:
             margin = np.broadcast_to(MARGINS_MAX, margin.shape)
         T1, T2 = filter_lengths(guide, v, machine, margin)
-        return ChordSpeeds(
-            guide=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin
-        )
+        v = np.minimum(v, feeds_held(guide, T1, T2))
+        return ChordSpeeds(guide=guide, v=v, T1=T1, T2=T2, margin=margin)
 
     def _by_error(self, made: Made) -> FloatArray:
         """(R,) by how much to slow down each chord for the error, or the normal acceleration [-]."""
         guide, command, seen = self.guide, made.command, made.seen
         delay = (self.T1 + self.T2)[guide.run]
-        around = AROUND * delay
-        duration = guide.length / self.v
-        standstills = guide.run  # in the command one follows each run
-        begin = command.begin[guide.run] + command.t[np.arange(len(guide)) + standstills] + delay / 2
+        around, duration = AROUND * delay, guide.length / self.v
+        step = np.arange(len(guide)) + guide.run  # in the command a standstill follows each run
+        begin = command.begin[guide.run] + command.t[step] + delay / 2
         factor = slowing(np.maximum(seen.error, seen.normal))
         by = slowest(seen.t, factor, begin - around, begin + duration + around)
         return np.where(guide.kappa > STRAIGHT, by, 1.0)
 
 
 def promised(guide: ChordGuide, machine: Machine) -> tuple[list[ChordSpeeds], FloatArray]:
-    """`SPEEDS` plans with lower and lower largest speeds, and the times (n, S) [s] they promise S runs.
-
-    guide : its dwells are not looked at
-    """
+    """`SPEEDS` plans with lower and lower largest speeds, and the times (n, S) [s] they promise S runs, without dwells."""
     high = guide.largest(guide.feed)
     corners = np.add.reduceat(np.diff(guide.corner, prepend=-1) > 0, guide.first[:-1])
     leg = guide.total(guide.length) / (1 + corners)
@@ -132,10 +125,7 @@ def promised(guide: ChordGuide, machine: Machine) -> tuple[list[ChordSpeeds], Fl
 
 
 def fastest_speeds(guide: ChordGuide, machine: Machine) -> ChordSpeeds:
-    """The fastest of a few plans that keep tolerance and limits, each run by itself.
-
-    guide : without dwells, from `Guide.pick`
-    """
+    """The fastest of a few plans that keep tolerance and limits, each run of a guide without dwells by itself."""
     return settled_fastest(*promised(guide, machine), machine)
 
 
@@ -143,55 +133,36 @@ def _first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSp
     """First speeds up to `top` (S,) and the filters for them."""
     acceleration = machine.limits("acceleration", guide.axes)
     most, margin = np.minimum(guide.feed, top[guide.run]), np.ones((guide.runs, 2))
-    if guide.profile_filters is not None:
-        T1, T2 = guide.given_filters()
-        v = first_speeds(guide, most, acceleration, T1, T2)
-    else:
-        T1, T2 = filter_lengths(guide, most, machine, margin)
-        v = first_speeds(guide, most, acceleration, T1, T2)
-        T1, T2 = filter_lengths(guide, v, machine, margin)
+    given = guide.given_filters() if guide.profile_filters is not None else None
+    T1, T2 = given or filter_lengths(guide, most, machine, margin)
+    v = first_speeds(guide, most, acceleration, T1, T2)
+    T1, T2 = given or filter_lengths(guide, v, machine, margin)
     return ChordSpeeds(guide=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin)
 
 
 def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) how far inside a circle the filtered point runs [mm]: exact (module text).
-
-    rho    : (n,) radius [mm]
-    v      : (n,) speed [mm/s]
-    T1, T2 : (n,) filters [s]
-    """
+    """(n,) how far inside circles of radius `rho` (n,) [mm] the point runs at v (n,) [mm/s] behind filters T1, T2 (n,)
+    [s]: exact (module text) [mm]."""
     lag = v / (2.0 * np.pi * rho)  # np.sinc(x) is sin(pi x)/(pi x)
     return rho * (1.0 - np.sinc(lag * T1) * np.sinc(lag * T2))
 
 
 def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) speed [mm/s] at which the filters' error is `tol` (n,) [mm] (par. 24); inf if straight.
-
-    kappa  : (n,) curvature [1/mm]
-    T1, T2 : (n,) filters [s]
-    """
+    """(n,) speed [mm/s] at which the error of filters T1, T2 (n,) [s] is `tol` (n,) [mm] at the curvature `kappa` (n,)
+    [1/mm] (par. 24); inf if straight."""
     return np.sqrt(filter_error.feed_sq_max(kappa, tol, (T1, T2)))
 
 
 def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) speed [mm/s] at which the filtered point lags by phi [rad] (par. 26); inf if straight.
-
-    kappa  : (n,) curvature [1/mm]
-    T1, T2 : (n,) filters [s]
-    """
+    """The same at which the filtered point lags by phi [rad] (par. 26): (n,), with `kappa`, T1, T2 (n,)."""
     return np.sqrt(phase_lag.feed_sq_max(kappa, phi, (T1, T2)))
 
 
 def filter_lengths(
     guide: ChordGuide, speed: FloatArray, machine: Machine, margin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """T1 >= T2 (S,) [s] for the speeds on the chords (par. 19).
-
-    T1 = V/A, T1 T2 = V/J with the limits along chords times margins, or equal where A is not reached.
-
-    speed  : (R,) [mm/s]
-    margin : (S, 2) of T1 and of T1 T2 [-]
-    """
+    """T1 >= T2 (S,) [s] for a `speed` (R,) [mm/s] on the chords (par. 19): T1 = V/A, T1 T2 = V/J with the limits along
+    them, or equal where A is not reached; each times its `margin` (S, 2) [-]."""
     along = speed[:, None] * np.abs(guide.direction)
     by_a, by_j = (
         guide.largest((along / machine.limits(q, guide.axes)).max(axis=1)) for q in ("acceleration", "jerk")
@@ -202,11 +173,7 @@ def filter_lengths(
 
 
 def v_sc(guide: ChordGuide, T1: FloatArray, T2: FloatArray, phi: float) -> FloatArray:
-    """(R,) the paper's speed on each chord [mm/s] (par. 29).
-
-    T1, T2 : (S,) filters of the runs [s]
-    phi    : phase lag [rad]
-    """
+    """(R,) the paper's speed on each chord [mm/s] (par. 29), with the filters T1, T2 (S,) [s] of runs and phi [rad]."""
     T1, T2 = T1[guide.run], T2[guide.run]
     by_filters = v_eps(guide.kappa, guide.tol, T1, T2), v_ph(guide.kappa, phi, T1, T2)
     return np.min([guide.feed, guide.v_acc, guide.v_jerk, *by_filters], axis=0)
@@ -215,9 +182,8 @@ def v_sc(guide: ChordGuide, T1: FloatArray, T2: FloatArray, phi: float) -> Float
 def first_speeds(
     guide: ChordGuide, most: FloatArray, acceleration: FloatArray, T1: FloatArray, T2: FloatArray
 ) -> FloatArray:
-    """(R,) speeds to begin with [mm/s], too fast rather than too slow (module text).
-
-    What the curvature beside a chord or the mean of the path allows, and corners for their gap.
+    """(R,) speeds to begin with [mm/s], too fast rather than too slow: what the curvature beside a chord or the mean of
+    the path allows, and corners for their gap (module text).
 
     most         : (R,) largest speeds [mm/s]
     acceleration : (A,) limits of the axes [mm/s2]
@@ -275,9 +241,8 @@ def _slower_corners(
     V = np.sqrt(most[at] * most[last])
     gap = T1[run] + T2[run] - overlap_time(guide.whole[at], V, guide.sin_half[at], T1[run], T2[run])
     lasting = np.add.reduceat(guide.length[chord] / v[chord], first)
-    by[chord] = np.repeat(
-        np.minimum(lasting / np.maximum(gap, 1e-300), 1.0), np.diff(np.append(first, len(chord)))
-    )
+    share = np.minimum(lasting / np.maximum(gap, 1e-300), 1.0)
+    by[chord] = np.repeat(share, np.diff(np.append(first, len(chord))))
     return by
 
 

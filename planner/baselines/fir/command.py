@@ -61,26 +61,21 @@ def command_of(
     stop = ~guide.inner[joint]
     waits = stop | (gap[joint] > 0)
     after = ends_leg[waits] + 1  # a gap or a standstill follows these pulses
-
     duration = np.insert(pulses.length / pulses.speed, after, np.where(stop, 0.0, gap[joint])[waits])
     which = np.insert(leg, after, leg[ends_leg][waits])
     moving = np.insert(np.ones(len(leg), bool), after, False)
     ends_run = np.insert(np.zeros(len(leg), bool), after, stop[waits])
     speed = np.insert(pulses.speed, after, 0.0)
-
     first = np.concatenate([[0], np.flatnonzero(ends_run) + 1])
     t = _starts(duration, first)
-
     within = np.cumsum(pulses.length) - pulses.length
-    first_pulse = np.searchsorted(leg, leg)
-    along = np.insert(within - within[first_pulse], after, 0.0)
+    along = np.insert(within - within[np.searchsorted(leg, leg)], after, 0.0)
     start = np.column_stack([guide.point, guide.s])
     position = start[which + ~moving]
     direction = np.column_stack([guide.direction, np.ones(len(guide))])[which[moving]]
     position[moving] += along[moving, None] * direction
     velocity = np.zeros_like(position)
     velocity[moving] = speed[moving, None] * direction
-
     lasting = t[first[1:] - 1] + T1 + T2 + guide.dwell[1:]
     return Command(
         first=first,

@@ -42,22 +42,17 @@ def fastest_schedule(guide: LegGuide, machine: Machine) -> Schedule:
     """The fastest schedule found that keeps tolerance and limits; its guide may have more full stops."""
     plan = _settled(guide, machine)
     for fraction in STOPS:
-        plan = _stopping(plan, machine, _waits(plan, fraction))
+        gap, (T1, T2) = plan.gap(), plan.at_joints()
+        waits = (gap > 0) & (gap >= fraction * (T1 + T2) * (1 - WAIT_ROUNDING))
+        plan = _stopping(plan, machine, waits)
     return _stopping(plan, machine, plan.guide.inner & (plan.guide.sin_half > 0))
-
-
-def _waits(plan: Schedule, fraction: float) -> Array:
-    """(R+1,) joints at which the command waits for this fraction of the filters' delay or longer."""
-    gap, (T1, T2) = plan.gap(), plan.at_joints()
-    return (gap > 0) & (gap >= fraction * (T1 + T2) * (1 - WAIT_ROUNDING))
 
 
 def _stopping(plan: Schedule, machine: Machine, stops: Array) -> Schedule:
     """Full stops at the joints `stops` (R+1,), in the runs that gain by it."""
     guide, time = plan.guide, plan.time()
-    tried = np.logical_or.reduceat(stops[:-1], guide.first[:-1]) & (
-        _least_time(guide, stops) < time * (1 - WORTH)
-    )
+    tried = np.logical_or.reduceat(stops[:-1], guide.first[:-1])
+    tried &= _least_time(guide, stops) < time * (1 - WORTH)
     if not tried.any():
         return plan
     legs = np.flatnonzero(tried[guide.run])
@@ -103,43 +98,26 @@ def _settled(guide: LegGuide, machine: Machine) -> Schedule:
     return settled_fastest(plans, np.array(times), machine)
 
 
-def filters_for(
-    guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """T1 and T2 (S,) [s]: the guide's own, or the shortest for legs run at their feed and at most at `speed`.
+def plan_for(guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray) -> Schedule:
+    """The first schedule for a speed, not yet slowed down, with the guide's own filters or the shortest: T1 = V/A, T2 =
+    margin A/J with the acceleration A and the jerk J that the axes allow along the legs (or both equal where V does not
+    reach A), lengthened to whole periods of the machine's vibration modes (eq. 10).
 
-    T1 = V/A, T2 = margin A/J with the acceleration A and the jerk J that the axes allow along the legs (or
-    both equal where V does not reach A), lengthened to whole periods of the machine's vibration modes (eq.
-    10).
-
-    speed  : (S,) [mm/s]
-    margin : (S,) [-]
+    speed  : (S,) largest speed on each run [mm/s]
+    margin : (S,) on T2 = A/J [-]
     """
-    if guide.profile_filters is not None:
-        return guide.given_filters()
     V = np.minimum(guide.feed, speed[guide.run])
-    T1 = guide.largest(V / guide.a_max)
-    product = margin * guide.largest(V / guide.j_max)
+    if guide.profile_filters is not None:
+        return schedule(guide, machine, V, *guide.given_filters())
+    T1, product = guide.largest(V / guide.a_max), margin * guide.largest(V / guide.j_max)
     sharpest = guide.largest(V * guide.sin_half[1:] / guide.tol[1:])
     T1 = np.maximum(T1, sharpest * machine.dt**2 / (4 * CHORD_FRACTION))
     T1 = np.maximum(T1, np.sqrt(product))
     T2 = product / T1
     modes = sorted(machine.modes, key=lambda mode: mode.frequency)[:MODES]
-    return (
-        suppressing(T1, T2, tuple(damped_period(m.frequency, m.damping) for m in modes))
-        if modes
-        else (T1, T2)
-    )
-
-
-def plan_for(guide: LegGuide, machine: Machine, speed: FloatArray, margin: FloatArray) -> Schedule:
-    """The first schedule with the filters for a speed, not yet slowed down.
-
-    speed  : (S,) largest speed on each run [mm/s]
-    margin : (S,) on T2 = A/J [-]
-    """
-    T1, T2 = filters_for(guide, machine, speed, margin)
-    return schedule(guide, machine, np.minimum(guide.feed, speed[guide.run]), T1, T2)
+    if modes:
+        T1, T2 = suppressing(T1, T2, tuple(damped_period(m.frequency, m.damping) for m in modes))
+    return schedule(guide, machine, V, T1, T2)
 
 
 def plain_plan(guide: LegGuide, machine: Machine) -> Schedule:
@@ -148,10 +126,8 @@ def plain_plan(guide: LegGuide, machine: Machine) -> Schedule:
     V = guide.largest(guide.feed)
     T1, T2 = lengths_from_limits(V, a, j) if guide.profile_filters is None else guide.given_filters()
     before, after, at = guide.feed[:-1], guide.feed[1:], guide.run[1:]
-    overlap = np.zeros(len(guide) + 1)
-    overlap[1:-1] = overlap_time(
-        guide.tol[1:-1], np.sqrt(before * after), guide.sin_half[1:-1], T1[at], T2[at]
-    )
+    overlap, V = np.zeros(len(guide) + 1), np.sqrt(before * after)
+    overlap[1:-1] = overlap_time(guide.tol[1:-1], V, guide.sin_half[1:-1], T1[at], T2[at])
     return Schedule(
         guide=guide,
         T1=T1,

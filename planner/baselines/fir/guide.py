@@ -4,9 +4,7 @@ Filters are empty at a full stop, so every run may have its own. Paper 000 runs 
 become chords, collinear lines of one feed are one leg. Paper 001 runs along the fine chords of a smooth path
 (chord_guide.py).
 
-Records over a guide have columns: one value per run between full stops, per leg or per joint. A field that is
-declared so is checked and made read-only, picked for some runs and put back, for every record in the same
-way.
+Records over a guide have columns, one row per run, leg or joint: checked, picked for some runs and put back.
 """
 
 import dataclasses
@@ -26,25 +24,11 @@ from planner.machine import Machine
 
 # Fraction of the tolerance that chords of arcs may use [-]: the filters' error grows with feed^2.
 CHORD_FRACTION = 0.05
+AXES = (-1,)  # width of a column for every axis
 
 
-def per_run(width: int | None = None) -> Any:
-    """A field (S,), or (S, width), of float64."""
-    return _column("run", np.float64, width)
-
-
-def per_leg(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
-    """A field (R,), or (R, A) with `axes`; with `finite=False` infinity is allowed."""
-    return _column("leg", dtype, -1 if axes else None, finite)
-
-
-def per_joint(dtype: type = np.float64, *, finite: bool = True, axes: bool = False) -> Any:
-    """A field (R+1,), or (R+1, A) with `axes`."""
-    return _column("joint", dtype, -1 if axes else None, finite)
-
-
-def _column(rows: str, dtype: type, width: int | None, finite: bool = True) -> Any:
-    """A field with its rows, type and width in the metadata; width -1 for one column per axis."""
+def per(rows: str, dtype: type = np.float64, *, width: tuple[int, ...] = (), finite: bool = True) -> Any:
+    """A field with a row per "run", "leg" or "joint": (n, *width); with `finite=False` infinity is allowed."""
     return field(metadata={"rows": rows, "dtype": dtype, "width": width, "finite": finite})
 
 
@@ -54,24 +38,18 @@ def _columns(record: Any) -> list[tuple[str, Any]]:
 
 
 def freeze_columns(record: Any, sizes: dict[str, int], axes: int) -> None:
-    """Check the columns of a record and make them read-only.
-
-    sizes : number of rows per "run", "leg" and "joint"
-    axes  : A, the width of columns with `axes`
+    """Check the columns of a record with `sizes` rows per "run", "leg" and "joint", and make them read-only.
 
     Raises ValueError for a column of another shape, or one that is not finite and should be.
     """
     for name, of in _columns(record):
-        width = () if of["width"] is None else (axes if of["width"] < 0 else of["width"],)
+        width = (axes,) if of["width"] == AXES else of["width"]
         freeze(record, name, of["dtype"], (sizes[of["rows"]], *width), finite=of["finite"])
 
 
 def chosen_rows(first: Array, chosen: Array) -> dict[str, Array]:
-    """Indices of the rows that the chosen runs have, for "run", "leg" and "joint".
-
-    first  : (S+1,) first joint of each run, as of `Guide`
-    chosen : (S,) True for the runs that are meant, one at least
-    """
+    """Indices (n,) of the rows, per "run", "leg" and "joint", of the runs `chosen` (S,), one at least; `first` (S+1,)
+    as of `Guide`."""
     run = np.flatnonzero(chosen)
     legs = np.flatnonzero(np.repeat(chosen, np.diff(first)))
     return {"run": run, "leg": legs, "joint": np.append(legs, first[run[-1] + 1])}
@@ -83,11 +61,8 @@ def picked(record: Any, rows: dict[str, Array]) -> dict[str, Any]:
 
 
 def put_back(record: Any, rows: dict[str, Array], chosen: Any) -> dict[str, Any]:
-    """All columns of a record by name, some rows of another; the joint at a run's end is the next run's.
-
-    rows   : (n,) of "run", "leg" and "joint" (`chosen_rows`)
-    chosen : a record of these rows alone
-    """
+    """All columns of a record by name, with those `rows` (n,) (`chosen_rows`) that the record `chosen` has alone; the
+    joint at a run's end is the next run's."""
     columns: dict[str, Any] = {}
     for name, of in _columns(record):
         last = -1 if of["rows"] == "joint" else None
@@ -117,22 +92,19 @@ def check_profile_filters(times: tuple[float, float] | None) -> None:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guide(ABC):
-    """R legs over A axes, R+1 joints, S runs; run k: joints first[k] .. first[k+1], ends are full stops.
-
-    The legs of a guide are straight: legs of the program, or chords of a smooth path.
-    """
+    """R straight legs over A axes, R+1 joints, S runs; run k: joints first[k] .. first[k+1], ends are full stops."""
 
     axes: tuple[str, ...]  # axis letters
     # lengths of the two filters that every run has [s]; None to choose them
     profile_filters: tuple[float, float] | None = None
     first: Array  # (S+1,) first joint of each run, and the last joint of all
     dwell: FloatArray  # (S+1,) standstill before the first run and after each [s]
-    point: FloatArray = per_joint(axes=True)  # (R+1, A) the joints [mm]
-    s: FloatArray = per_joint()  # (R+1,) length from the start [mm]
-    length: FloatArray = per_leg()  # (R,) [mm]
-    direction: FloatArray = per_leg(axes=True)  # (R, A) unit vectors
+    point: FloatArray = per("joint", width=AXES)  # (R+1, A) the joints [mm]
+    s: FloatArray = per("joint")  # (R+1,) length from the start [mm]
+    length: FloatArray = per("leg")  # (R,) [mm]
+    direction: FloatArray = per("leg", width=AXES)  # (R, A) unit vectors
     # (R,) programmed feed, at most what the axes' velocities allow along the leg [mm/s]
-    feed: FloatArray = per_leg()
+    feed: FloatArray = per("leg")
 
     def __post_init__(self) -> None:
         freeze(self, "first", np.int64, (None,))
@@ -198,12 +170,12 @@ class LegGuide(Guide):
     """The legs of a program, with what paper 000's rules need of them."""
 
     lines: Toolpath  # the toolpath with its arcs as chords
-    joint_at: Array = per_joint(np.int64)  # (R+1,) index of each joint among those of `lines`
-    slower: Array = per_leg(np.bool_)  # (R,) True where another leg of the run is programmed faster
-    a_max: FloatArray = per_leg()  # (R,) acceleration along the leg that the axes allow [mm/s2]
-    j_max: FloatArray = per_leg()  # (R,) jerk along the leg that the axes allow [mm/s3]
-    tol: FloatArray = per_joint()  # (R+1,) contour error budget at the joint [mm]
-    sin_half: FloatArray = per_joint()  # (R+1,) sine of half the turning angle at the joint, 0 at full stops
+    joint_at: Array = per("joint", np.int64)  # (R+1,) index of each joint among those of `lines`
+    slower: Array = per("leg", np.bool_)  # (R,) True where another leg of the run is programmed faster
+    a_max: FloatArray = per("leg")  # (R,) acceleration along the leg that the axes allow [mm/s2]
+    j_max: FloatArray = per("leg")  # (R,) jerk along the leg that the axes allow [mm/s3]
+    tol: FloatArray = per("joint")  # (R+1,) contour error budget at the joint [mm]
+    sin_half: FloatArray = per("joint")  # (R+1,) sine of half the turning angle at the joint, 0 at full stops
 
     @property
     def budget(self) -> FloatArray:
@@ -223,10 +195,7 @@ class LegGuide(Guide):
 def guide_of_legs(
     toolpath: Toolpath, machine: Machine, profile_filters: tuple[float, float] | None = None
 ) -> LegGuide:
-    """The legs of a toolpath.
-
-    profile_filters : lengths of the two filters of every run [s]; None to choose them
-    """
+    """The legs of a toolpath; `profile_filters` as of `Guide`."""
     lines = chorded(toolpath, CHORD_FRACTION, np.zeros(len(toolpath), bool))
     legs = legs_of(parted_by_feed(lines))
     at = legs.first

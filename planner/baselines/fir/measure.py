@@ -121,16 +121,12 @@ def _normal_peak(motion, m, begin, lasting, linear):
 
 @njit(cache=True, error_model="numpy")
 def _reaching(state, s, duration):
-    """tau in [0, duration] at which p + v tau + a tau^2/2 + j tau^3/6, which never falls, reaches s; state:
-    p, v, a, j."""
+    """tau in [0, duration] at which p + v tau + a tau^2/2 + j tau^3/6, which never falls, reaches s; state: p, v, a, j."""
     p, v, a, j = state
     low, high = 0.0, duration
     for _ in range(BISECTIONS):
         tau = 0.5 * (low + high)
-        if p + tau * (v + tau * (a / 2.0 + tau * j / 6.0)) < s:
-            low = tau
-        else:
-            high = tau
+        low, high = (tau, high) if p + tau * (v + tau * (a / 2.0 + tau * j / 6.0)) < s else (low, tau)
     return 0.5 * (low + high)
 
 
@@ -161,13 +157,9 @@ def _record(motion, m, tau, line, leg, limits, out):
 
 
 def slowest(t: FloatArray, factor: FloatArray, begin: FloatArray, end: FloatArray) -> FloatArray:
-    """(n,) smallest factor among the times within begin <= t <= end; 1 where there is none.
-
-    t, factor  : (T,) ascending times [s], and a factor for each [-]
-    begin, end : (n,) [s], both ascending
-    """
-    first, last = np.searchsorted(t, begin, side="left"), np.searchsorted(t, end, side="right")
-    return _window_min(factor, first, last)
+    """(n,) smallest `factor` (T,) [-] of the ascending times t (T,) within begin <= t <= end, both (n,), ascending [s]; 1
+    where there is none."""
+    return _window_min(factor, np.searchsorted(t, begin), np.searchsorted(t, end, side="right"))
 
 
 @njit(cache=True, error_model="numpy")

@@ -39,14 +39,11 @@ the cubic zone is V1 V2/(V1^(1/3) + V2^(1/3))^3 <= sqrt(V1 V2)/8, with equality 
 would be too small.
 
 Neighbours on a leg that is run through in Tv do not disturb each other's error if Tk_i + Tk_{i+1} <= Tv + Td.
-
 Peaks of the axes within an isolated corner (Tv >= Td), with eta = (Tk - T2)/T2 clipped to [0, 1]:
 
     acceleration  max(|w1 - eta w2|, |w2 - eta w1|) / T1
     jerk          max(|w1|, |w2|;  |w1 + w2| if 0 < Tk < 2 T2;  |w2 - w1| if Tk > T1) / (T1 T2)
 """
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -68,10 +65,9 @@ def corner_error(
 ) -> FloatArray:
     """(n,) by how much the vertex is missed [mm] (eq. 14).
 
-    overlap  : (n,) Tk [s], 0 <= Tk <= Td
-    V        : (n,) speed of the pulses, the geometric mean of two [mm/s]
-    sin_half : (n,) sine of half the turning angle [-]
-    T1, T2   : (n,) filters [s]
+    overlap     : (n,) Tk [s], 0 <= Tk <= Td
+    V, sin_half : (n,) speed of the pulses, the geometric mean of two [mm/s]; sine of half the turning angle [-]
+    T1, T2      : (n,) filters [s]
     """
     cubic = overlap**3 / (24 * T1 * T2)
     square = (4 * T2**2 - 6 * T2 * overlap + 3 * overlap**2) / (12 * T1)
@@ -84,8 +80,7 @@ def overlap_within(
     """(n,) overlap Tk [s] whose corner error and chord error at dt [s] are within `tol` (n,) [mm].
 
     At the middle the acceleration is 2 V h(Tk/2) s, the chord over a period leaves the motion by dt^2/8 of
-    it. What is left for the corner is reckoned with the overlap that the whole tolerance would allow, the
-    longer one, and is half of it at least.
+    it: reckoned with the longer overlap that the whole tolerance would allow, and half the tolerance at most.
 
     V, sin_half, T1, T2 : (n,) as of `corner_error`
     """
@@ -126,8 +121,8 @@ def overlap_within_limits(
     j_room = jerk * (T1 * T2)[:, None] * (1 + LIMIT_ROUNDING)
     eta = np.ones(len(overlap))  # the largest that is allowed
     for one, other in ((w1, w2), (w2, w1)):
-        opposed = one * other < 0
-        room = np.divide(a_room - np.abs(one), np.abs(other), out=np.ones_like(one), where=opposed)
+        free = a_room - np.abs(one)
+        room = np.divide(free, np.abs(other), out=np.ones_like(one), where=one * other < 0)
         eta = np.minimum(eta, np.clip(room.min(axis=1), 0.0, 1.0))
     overlap = np.where(eta < 1, np.minimum(overlap, T2 * (1 + eta)), overlap)
     apart = (np.abs(w2 - w1) > j_room).any(axis=1)
@@ -163,9 +158,12 @@ def schedule(
     tied = np.zeros(len(guide) + 1, bool)  # where the command stands still
     tied[guide.first], tied[inner[waits]] = True, True
     speed = _apart(guide, speed, tied, filters)
-    passing[inner[~waits]] = _flowing(
-        guide, machine, speed, inner[~waits], tied, T1_at[~waits], T2_at[~waits]
-    )
+    flow, T1_flow, T2_flow = inner[~waits], T1_at[~waits], T2_at[~waits]
+    tol = guide.tol[flow] / (
+        1 + 3 * machine.dt**2 / (T1_flow**2 + T2_flow**2)
+    )  # the rest is the chord error of samples
+    fastest, allowed = np.maximum(speed[flow - 1], speed[flow]), (tol, a, largest_normal(machine))
+    passing[flow] = _flow_speeds(flow, np.flatnonzero(tied), fastest, guide.line, allowed, T1_flow, T2_flow)
 
     at, delay = inner[waits], filters.sum(axis=0)
     overlap[at] = waiting[waits]
@@ -207,48 +205,23 @@ def _apart(guide: LegGuide, speed: FloatArray, tied: Array, filters: FloatArray)
     return np.where(meet, np.minimum(speed, slower), speed)
 
 
-def _flowing(
-    guide: LegGuide,
-    machine: Machine,
-    speed: FloatArray,
-    joint: Array,
-    tied: Array,
-    T1: FloatArray,
-    T2: FloatArray,
-) -> FloatArray:
-    """Largest speeds (n,) at the flow joints `joint` [mm/s]: the rule of the module's text."""
-    allowed = _Allowed(
-        # the rest is the chord error of samples
-        guide.tol[joint] / (1 + 3 * machine.dt**2 / (T1**2 + T2**2)),
-        machine.limits("acceleration", guide.axes),
-        largest_normal(machine),
-    )
-    fastest = np.maximum(speed[joint - 1], speed[joint])
-    return _flow_speeds(joint, np.flatnonzero(tied), fastest, guide.line, allowed, T1, T2)
-
-
-class _Allowed(NamedTuple):
-    """Error at each flow joint (n,) [mm], acceleration of the axes (A,) and normal acceleration [mm/s2]."""
-
-    error: FloatArray
-    acceleration: FloatArray
-    normal: float
-
-
 @njit(cache=True, error_model="numpy")
 def _flow_speeds(joint, tied, speed, line, allowed, T1, T2):
-    """Largest speeds at the joints [mm/s], inf where `speed` (n,) is not too fast."""
-    out = np.empty(len(joint))
-    k = 0
+    """Largest speeds at the flow joints (n,) [mm/s] by the rule of the module's text, inf where `speed` (n,) is not too
+    fast.
+
+    allowed : error at each joint (n,) [mm], acceleration of the axes (A,) and normal acceleration [mm/s2]
+    """
+    out, k = np.empty(len(joint)), 0
+    error_max, a_max, normal_max = allowed
     for n in range(len(joint)):
         while tied[k + 1] < joint[n]:
             k += 1
         V = speed[n]
         for _ in range(FLOW_STEPS):
-            error, acceleration, normal = _at_speed(
-                joint[n], (tied[k], tied[k + 1]), V, line, allowed.acceleration, T1[n], T2[n]
-            )
-            over = max(error / allowed.error[n], acceleration, normal / allowed.normal)
+            between = tied[k], tied[k + 1]
+            error, acceleration, normal = _at_speed(joint[n], between, V, line, a_max, T1[n], T2[n])
+            over = max(error / error_max[n], acceleration, normal / normal_max)
             if over <= 1.0:
                 break
             V *= max(FLOW_STEP_MIN, 0.99 / np.sqrt(over))

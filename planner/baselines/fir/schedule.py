@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.command import Command, VelocityPulses, command_of, lower_between
-from planner.baselines.fir.guide import LegGuide, per_joint, per_leg
+from planner.baselines.fir.guide import LegGuide, per
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import SLOWEST, Made, SpeedPlan, slowing
 from planner.machine import Machine
@@ -34,12 +34,12 @@ class Schedule(SpeedPlan):
     """Speeds and overlaps of a guide of R legs."""
 
     guide: LegGuide
-    speed: FloatArray = per_leg()  # (R,) largest speed on each leg [mm/s]
+    speed: FloatArray = per("leg")  # (R,) largest speed on each leg [mm/s]
     # (R+1,) largest speed at a flow joint, inf where there is no such limit [mm/s]
-    passing: FloatArray = per_joint(finite=False)
+    passing: FloatArray = per("joint", finite=False)
     # (R+1,) Tk [s]: Td at flow joints, less where the command waits, 0 at full stops
-    overlap: FloatArray = per_joint()
-    holding: Array = per_leg(np.bool_)  # (R,) True for legs whose feed holds on V Td/2 beyond their ends
+    overlap: FloatArray = per("joint")
+    holding: Array = per("leg", np.bool_)  # (R,) True for legs whose feed holds on V Td/2 beyond their ends
 
     def at_joints(self) -> tuple[FloatArray, FloatArray]:
         """T1 and T2 (R+1,) of the run that each joint lies in (the last joint: of the last one)."""
@@ -62,25 +62,20 @@ class Schedule(SpeedPlan):
         return command_of(self.guide, velocity_pulses(self), self.gap(), self.T1, self.T2)
 
     def slower(self, made: Made, machine: Machine, n: int) -> Schedule:
-        """Slower legs and joints, longer waits for what the motion exceeds (module text).
-
-        made : the motion of this plan
-        n    : rounds before this one; from `ROUNDS` on the guide is run from joint to joint
-        """
-        if n >= ROUNDS - 1:
-            return _stopping(self)
-        return _slower(self, made, slowing(made.seen.worst, max(SLOWEST, 1.0 - HASTE * n)))
+        """Slower legs and joints, longer waits for what the motion exceeds; after `ROUNDS` half the speed and full stops
+        at all joints (module text)."""
+        if n < ROUNDS - 1:
+            return _slower(self, made, slowing(made.seen.worst, max(SLOWEST, 1.0 - HASTE * n)))
+        passing, overlap = np.where(self.guide.inner, [[np.inf], [0.0]], [self.passing, self.overlap])
+        return dataclasses.replace(self, speed=self.speed / 2, passing=passing, overlap=overlap)
 
 
 def velocity_pulses(plan: Schedule) -> VelocityPulses:
     """The pulses of a schedule: legs at their speeds, cut where a slower joint or block reaches into one."""
     guide, (T1, T2) = plan.guide, plan.at_joints()
-    delay = T1 + T2
+    delay, run = T1 + T2, np.append(guide.run, guide.runs - 1)
     low, high = guide.s[guide.first[:-1]], guide.s[guide.first[1:]]
-    run = np.append(guide.run, guide.runs - 1)
-
-    slow = np.flatnonzero(plan.passing < np.inf)
-    legs = np.flatnonzero(plan.holding)
+    slow, legs = np.flatnonzero(plan.passing < np.inf), np.flatnonzero(plan.holding)
     value = np.concatenate([plan.passing[slow], guide.feed[legs]])
     where = np.concatenate([run[slow], run[legs]])
     reach = value * delay[np.concatenate([slow, legs])] / 2
@@ -109,8 +104,12 @@ def _slower(plan: Schedule, made: Made, factor: FloatArray) -> Schedule:
     first = np.searchsorted(pulses.leg, np.arange(len(guide)))
     last = np.append(first[1:], len(pulses.leg)) - 1
     duration = pulses.length / pulses.speed
-    begin, end = _leg_times(guide, made.command)
-    delay = (plan.T1 + plan.T2)[guide.run]
+    command, delay = made.command, (plan.T1 + plan.T2)[guide.run]
+    # when the command begins and ends each leg
+    begins, ends = (np.searchsorted(command.leg, np.arange(len(guide)) + side) for side in (0, 1))
+    t = command.t + np.repeat(command.begin, np.diff(command.first))
+    standing = command.velocity[ends - 1, -1] == 0
+    begin, end = t[begins], np.where(standing, t[ends - 1], np.append(t[begins[1:]], t[-1]))
 
     fastest = np.maximum.reduceat(pulses.speed, first)
     at_fastest = np.add.reduceat(np.where(pulses.speed == fastest[pulses.leg], duration, 0.0), first)
@@ -127,23 +126,3 @@ def _slower(plan: Schedule, made: Made, factor: FloatArray) -> Schedule:
     passing[flow] = np.minimum(passing[flow], actual * by_joint[flows & (by_joint < 1)])
     overlap[wait] *= by_joint[~flows]
     return dataclasses.replace(plan, speed=speed, passing=passing, overlap=overlap)
-
-
-def _leg_times(guide: LegGuide, command: Command) -> tuple[FloatArray, FloatArray]:
-    """When the command begins and ends each leg (R,) [s]."""
-    first = np.searchsorted(command.leg, np.arange(len(guide)))
-    last = np.append(first[1:], len(command.leg)) - 1
-    t = command.t + np.repeat(command.begin, np.diff(command.first))
-    standing = command.velocity[last, -1] == 0
-    return t[first], np.where(standing, t[last], np.append(t[first[1:]], t[-1]))
-
-
-def _stopping(plan: Schedule) -> Schedule:
-    """Full stops at all joints, and half the speed."""
-    inner = plan.guide.inner
-    return dataclasses.replace(
-        plan,
-        speed=plan.speed / 2,
-        passing=np.where(inner, np.inf, plan.passing),
-        overlap=np.where(inner, 0.0, plan.overlap),
-    )

@@ -18,7 +18,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.baselines.fir.command import Command
-from planner.baselines.fir.guide import Guide, chosen_rows, freeze_columns, per_run, picked, put_back
+from planner.baselines.fir.guide import Guide, chosen_rows, freeze_columns, per, picked, put_back
 from planner.baselines.fir.measure import Measured, measure
 from planner.baselines.fir.superpose import Filtered, superpose
 from planner.machine import Machine
@@ -41,13 +41,12 @@ class SpeedPlan(ABC):
     """
 
     guide: Guide
-    T1: FloatArray = per_run()
-    T2: FloatArray = per_run()
+    T1: FloatArray = per("run")
+    T2: FloatArray = per("run")
 
     def __post_init__(self) -> None:
-        legs = len(self.guide)
-        sizes = {"run": self.guide.runs, "leg": legs, "joint": legs + 1}
-        freeze_columns(self, sizes, len(self.guide.axes))
+        guide = self.guide
+        freeze_columns(self, {"run": guide.runs, "leg": len(guide), "joint": len(guide) + 1}, len(guide.axes))
 
     @abstractmethod
     def command(self) -> Command:
@@ -59,11 +58,7 @@ class SpeedPlan(ABC):
 
     @abstractmethod
     def slower(self, made: Made, machine: Machine, n: int) -> Self:
-        """A slower plan, of which only runs that exceed something are used.
-
-        made : the motion of this plan
-        n    : rounds before this one
-        """
+        """A plan slower than that of the motion `made`, after n rounds; only runs that exceed something are used."""
 
     def pick(self, chosen: Array) -> Self:
         """The plan of the runs `chosen` (S,) of its guide."""
@@ -129,21 +124,14 @@ def settled_fastest(plans: Sequence[P], times: FloatArray, machine: Machine) -> 
         tried = promised < time * (1 - WORTH)
         if not tried.any():
             break
-        new = slow_down(_mixed(plans, rank).pick(tried), machine)
+        mixed = plans[0]  # each run with its own of the plans
+        for k in np.unique(rank[rank > 0]):
+            mixed = mixed.put(rank == k, plans[k].pick(rank == k))
+        new = slow_down(mixed.pick(tried), machine)
         new_time = new.time()
         better = new_time < time[tried]
-        taken = tried.copy()
-        taken[tried] = better
+        tried[tried] = better
         if better.any():
-            best = best.put(taken, new.pick(better))
-        time[taken] = new_time[better]
+            best = best.put(tried, new.pick(better))
+        time[tried] = new_time[better]
     return best
-
-
-def _mixed(plans: Sequence[P], which: Array) -> P:
-    """Each run with its own (S,) of the plans."""
-    mixed = plans[0]
-    for k in range(1, len(plans)):
-        if (which == k).any():
-            mixed = mixed.put(which == k, plans[k].pick(which == k))
-    return mixed

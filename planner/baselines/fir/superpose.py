@@ -55,10 +55,8 @@ def superpose(command: Command) -> Filtered:
 
 def reached(motion: Filtered) -> FloatArray:
     """(P,) how far the middle of each piece has come along the guide, its last column [mm]."""
-    middle = (motion.ends + motion.t) / 2 - motion.t
-    s, v, a, j = motion.state[:, :, -1]
-    along: FloatArray = s + middle * (v + middle * (a / 2 + middle * j / 6))
-    return along
+    middle, (s, v, a, j) = (motion.ends + motion.t) / 2 - motion.t, motion.state[:, :, -1]
+    return np.asarray(s + middle * (v + middle * (a / 2 + middle * j / 6)))
 
 
 def axes_of(
@@ -73,22 +71,9 @@ def axes_of(
     t, state = motion.t, motion.state[:, :, :-1]
     if t[0] > 0:
         t, segment = np.insert(t, 0, 0.0), np.insert(segment, 0, first)
-        still = np.zeros((4, 1, len(start)))
-        still[0, 0] = start
-        state = np.concatenate([still, state], axis=1)
-    position, velocity, acceleration, jerk = state
-    return AxisMotion(
-        axes=toolpath.axes,
-        radius=toolpath.radius,
-        t=t,
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-        block=toolpath.block[segment],
-        line=toolpath.line[segment],
-        end=float(motion.ends[-1]),
-    )
+        state = np.insert(state, 0, 0.0, axis=1)
+        state[0, 0] = start
+    return AxisMotion.of(state, t, float(motion.ends[-1]), toolpath, segment)
 
 
 @njit(cache=True, error_model="numpy")
@@ -144,9 +129,7 @@ def _superpose(command, t_out, state, first_out):
                 n += 1
         if command.dwell[k] > 0.0:
             t_out[n] = command.begin[k] + at
-            for c in range(axes):
-                state[0, n, c] = command.position[high - 1, c]
-                state[1, n, c] = state[2, n, c] = state[3, n, c] = 0.0
+            state[0, n], state[1:, n] = command.position[high - 1], 0.0
             n += 1
     first_out[len(command.begin)] = n
     return n
@@ -154,8 +137,7 @@ def _superpose(command, t_out, state, first_out):
 
 @njit(cache=True, error_model="numpy")
 def _anchor(command, k, passed, at, now):
-    """Position, velocity and acceleration at `at` by superposition, into now; passed (4,): edges that are 0,
-    T2, T1, Td old."""
+    """Position, velocity and acceleration at `at` by superposition, into now; passed (4,): edges 0, T2, T1, Td old."""
     t, velocity, position = command.t, command.velocity, command.position
     low, T1, T2 = command.first[k], command.T1[k], command.T2[k]
     axes, delay, base = velocity.shape[1], T1 + T2, passed[3] - 1

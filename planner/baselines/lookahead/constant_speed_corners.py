@@ -110,11 +110,7 @@ def corner_chain(samples: PathSamples, machine: Machine, corner_speed: FloatArra
 
 @njit(cache=True, error_model="numpy")
 def _bends(on, limits, bends):
-    """The largest |r''_k|/a_k and |r'''_k|/j_k over each interval into bends (n, 2).
-
-    on     : `ElementIntervals`
-    limits : (2, A) accelerations and jerks of the axes
-    """
+    """The largest |r''_k|/a_k and |r'''_k|/j_k over each of the `ElementIntervals` into bends (n, 2); limits (2, A): a, j."""
     axes = limits.shape[1]
     work, here = np.empty((2, 4, axes)), np.empty((4, axes))
     values = np.empty((2, axes, STEPS + 1))

@@ -85,20 +85,15 @@ def corner_pieces(ways: np.recarray, limits: np.recarray, path: Legs, dwell: Flo
     return CornerPieces(*(column[:count] for column in cut))
 
 
-def along_axes(
-    pieces: CornerPieces, path: Legs, toolpath: Toolpath
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def along_axes(pieces: CornerPieces, path: Legs, toolpath: Toolpath) -> list[FloatArray]:
     """Position, velocity, acceleration and jerk (L, A) of the axes at the start of every piece."""
     vertex = np.vstack([path.vector("start"), toolpath.end[-1:]])
     direction = path.vector("direction")
     joint, before, after = pieces.joint, pieces.before, pieces.after
     u1, u2 = direction[np.maximum(joint - 1, 0)], direction[np.minimum(joint, len(path) - 1)]
-    position, velocity, acceleration, jerk = (
-        before[:, c, None] * u1 + after[:, c, None] * u2 for c in range(4)
-    )
-    position += vertex[joint]
+    columns = [before[:, c, None] * u1 + after[:, c, None] * u2 for c in range(4)]
+    columns[0] += vertex[joint]
     arc = (toolpath.arc[pieces.segment] >= 0) & (after[:, 1:] != 0.0).any(axis=1)  # not at standstill
-    columns = position, velocity, acceleration, jerk
     if arc.any():
         for values, along in zip(columns, _along_arcs(pieces, np.flatnonzero(arc), toolpath), strict=True):
             values[arc] = along
@@ -123,12 +118,8 @@ def _along_arcs(pieces: CornerPieces, move: Array, toolpath: Toolpath) -> tuple[
 def _spline_at_rest(
     duration: FloatArray, position: FloatArray, last: Array
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Velocity, acceleration and jerk (n, A) at the starts of n pieces on moves that begin and end at rest.
-
-    duration : (n,) [s]
-    position : (n + moves, A) points before and after every piece, move after move [mm]
-    last     : (n + moves,) True at the last point of each move
-    """
+    """Velocity, acceleration and jerk (n, A) at the starts of n pieces, of durations (n,) [s], on moves that begin and end at
+    rest, through points `position` (n + moves, A) [mm], of which some are the `last` (n + moves,) of their move."""
     from scipy.linalg import solve_banded  # 0.2 s
 
     start = np.flatnonzero(~last)  # the points that a piece starts at
@@ -147,14 +138,8 @@ def _spline_at_rest(
 
 def _empty(count: int) -> CornerPieces:
     """Room for so many pieces."""
-    return CornerPieces(
-        joint=np.zeros(count, np.int64),
-        leg=np.zeros(count, np.int64),
-        duration=np.zeros(count),
-        before=np.zeros((count, 4)),
-        after=np.zeros((count, 4)),
-        segment=np.zeros(count, np.int64),
-    )
+    joint, leg, segment = (np.zeros(count, np.int64) for _ in range(3))
+    return CornerPieces(joint, leg, np.zeros(count), np.zeros((count, 4)), np.zeros((count, 4)), segment)
 
 
 @njit(cache=True, error_model="numpy")
@@ -265,10 +250,7 @@ def _cut(rows, length, first, offset, out):
             low, high = 0.0, left
             for _ in range(BISECTIONS):
                 middle = 0.5 * (low + high)
-                if _along(state, middle) <= border:
-                    low = middle
-                else:
-                    high = middle
+                low, high = (middle, high) if _along(state, middle) <= border else (low, middle)
             if _along(state, 0.0) <= border:
                 count = n
                 n = _put(n, low, rows.joint[i], leg, state, out)

@@ -13,7 +13,7 @@ largest, the acceleration is normal, Vc 2s/T1 and Ac s.
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import FloatArray
 from planner.baselines.lookahead.corner_pieces import ARC_RAMP
 from planner.baselines.lookahead.look_ahead import capped, needed
 from planner.baselines.lookahead.ramps import LEG, WAY, JointKind, records
@@ -45,13 +45,9 @@ def leg_limits(path: Legs, toolpath: Toolpath, machine: Machine) -> np.recarray:
 def corner_passages(
     path: Legs, toolpath: Toolpath, legs: np.recarray, machine: Machine, start_stop: float
 ) -> list[np.recarray]:
-    """Zero entry acceleration, entry deceleration, perhaps a step of velocity, (n+1,) records `WAY` each.
-
-    Each is as fast as tolerance, limits and the feeds of both legs allow, whatever room it needs. Joints
-    without a corner are passed straight on by every candidate.
-
-    start_stop : step of velocity from standstill [mm/s]; 0 for none, then there are two candidates
-    """
+    """Zero entry acceleration, entry deceleration, and a step of velocity if `start_stop` [mm/s] is one, (n+1,) records
+    `WAY` each: as fast as tolerance, limits and the feeds of both legs allow, whatever room it needs. Joints without a
+    corner are passed straight on by all."""
     at = path.first
     turns = (toolpath.joint[at] == Joint.CORNER) & (toolpath.theta[at] >= COLLINEAR_ANGLE)
     bare = np.where(turns | (toolpath.joint[at] == Joint.STOP), JointKind.STOP, JointKind.PASS)
@@ -59,15 +55,26 @@ def corner_passages(
     direction = path.vector("direction")
     u1, u2 = direction[k - 1], direction[k]
     feed = np.minimum(np.append(legs.v, np.inf), np.insert(legs.v, 0, np.inf))
+    tol, limits = (
+        toolpath.tolerance[at[k]],
+        [machine.limits(q, toolpath.axes) for q in ("acceleration", "jerk")],
+    )
     ways = [
-        (JointKind.ZERO, *_zero_entry(u1, u2, toolpath.tolerance[at[k]], machine, toolpath.axes)),
-        (JointKind.ENTRY, *_entry(u1, u2, toolpath.tolerance[at[k]], machine, toolpath.axes)),
+        (JointKind.ZERO, *_zero_entry(u1, u2, tol, machine, *limits)),
+        (JointKind.ENTRY, *_entry(u1, u2, tol, machine, *limits)),
     ]
     if start_stop > 0:
-        ways.append(
-            (JointKind.PASS, *_velocity_step(u1, u2, toolpath.tolerance[at[k]], machine.dt, start_stop))
-        )
-    return [_candidate(bare, feed, k, *way) for way in ways]
+        # no axis steps by more; the chord between two samples cuts the vertex off by up to V dt s / 2
+        step, sin_half = np.abs(u2 - u1).max(axis=1), np.linalg.norm(u2 - u1, axis=1) / 2.0
+        V = np.minimum(start_stop / step, 2.0 * tol / (machine.dt * sin_half))
+        ways.append((JointKind.PASS, V, np.ones(len(k)), np.ones(len(k))))
+    passages = []
+    for kind, V, p, q in ways:
+        kinds, parameters = bare.copy(), np.zeros((3, len(bare)))
+        parameters[0] = np.where(bare == JointKind.PASS, feed, 0.0)
+        kinds[k], parameters[:, k] = kind, (np.minimum(V, feed[k]), p, q)
+        passages.append(records(WAY, kind=kinds, **dict(zip("Vpq", parameters, strict=True))))
+    return passages
 
 
 def fitted(passage: np.recarray, legs: np.recarray) -> np.recarray:
@@ -78,45 +85,33 @@ def fitted(passage: np.recarray, legs: np.recarray) -> np.recarray:
     return capped(passage, legs, share_legs(wanted, np.maximum(ease, EASE_MIN), legs.length))
 
 
-def _candidate(
-    bare: Array, feed: FloatArray, k: Array, kind: JointKind, V: FloatArray, p: FloatArray, q: FloatArray
-) -> np.recarray:
-    """One kind at the corners k with speeds V and parameters p, q."""
-    kinds, speed = bare.copy(), np.where(bare == JointKind.PASS, feed, 0.0)
-    first, second = np.zeros(len(bare)), np.zeros(len(bare))
-    kinds[k], speed[k], first[k], second[k] = kind, np.minimum(V, feed[k]), p, q
-    return records(WAY, kind=kinds, V=speed, p=first, q=second)
-
-
 def _zero_entry(
-    u1: FloatArray, u2: FloatArray, tol: FloatArray, machine: Machine, axes: tuple[str, ...]
+    u1: FloatArray,
+    u2: FloatArray,
+    tol: FloatArray,
+    machine: Machine,
+    acceleration: FloatArray,
+    jerk: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Speed, alpha and eta of the corners with zero entry acceleration."""
     across, rate = u2 - u1, error_rate(machine)
     twice = np.linalg.norm(across, axis=1)  # 2 s
-    eta = corner.ratio_min(machine.limits("jerk", axes), across)
-    alpha = corner.ratio_min(machine.limits("acceleration", axes), across)
+    alpha, eta = corner.ratio_min(acceleration, across), corner.ratio_min(jerk, across)
     alpha = np.minimum(alpha, np.minimum(largest_normal(machine), tol / (2.0 * rate)) / twice)
     bow = rate * twice * np.minimum(alpha, np.cbrt(6.0 * tol * eta**2 / twice))
     return corner.speed_from_middle((tol - bow) / twice, alpha, eta), alpha, eta
 
 
-def _velocity_step(
-    u1: FloatArray, u2: FloatArray, tol: FloatArray, dt: float, start_stop: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Speed at the vertex with no axis stepping by more than `start_stop`; the chord between two samples cuts
-    the vertex off by up to V dt s / 2. This kind has no parameters."""
-    step = np.abs(u2 - u1).max(axis=1)
-    sin_half = np.linalg.norm(u2 - u1, axis=1) / 2.0
-    return np.minimum(start_stop / step, 2.0 * tol / (dt * sin_half)), np.ones(len(u1)), np.ones(len(u1))
-
-
 def _entry(
-    u1: FloatArray, u2: FloatArray, tol: FloatArray, machine: Machine, axes: tuple[str, ...]
+    u1: FloatArray,
+    u2: FloatArray,
+    tol: FloatArray,
+    machine: Machine,
+    acceleration: FloatArray,
+    jerk: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Speed, largest entry deceleration and largest jerk of the corners with entry deceleration."""
-    rate = error_rate(machine)
-    twice = np.linalg.norm(u2 - u1, axis=1)
-    a, J = corner.entry_limits(u1, u2, machine.limits("acceleration", axes), machine.limits("jerk", axes))
+    rate, twice = error_rate(machine), np.linalg.norm(u2 - u1, axis=1)
+    a, J = corner.entry_limits(u1, u2, acceleration, jerk)
     a = np.minimum(a, np.minimum(2.0 * largest_normal(machine) / twice, tol / (2.0 * rate)))
     return corner.entry_speed_from_middle((tol - rate * a) / twice, a, J), a, J

@@ -79,14 +79,27 @@ def capped(ways: np.recarray, legs: np.recarray, room: FloatArray) -> np.recarra
     return lower
 
 
-def moves(ways: np.recarray, legs: np.recarray) -> tuple[FloatArray, FloatArray]:
+@njit(cache=True, error_model="numpy")
+def moves(ways, legs):
     """Durations [s] and jerks along the path [mm/s3], (n, 8): the corner before each leg, then its phases."""
     duration, jerk = np.zeros((len(legs), 1 + PHASES)), np.zeros((len(legs), 1 + PHASES))
-    _moves(ways, legs, duration, jerk)
+    phases = np.empty((2, PHASES))
+    for i in range(len(legs)):
+        one, other = _leg_ends(ways, legs, i)
+        leg_phases(one, other, legs[i], phases)
+        duration[i, 0] = corner_at(ways[i], ways[i].V, True)[2]
+        duration[i, 1:], jerk[i, 1:] = phases[0], phases[1]
     return duration, jerk
 
 
 # ---- speeds that fit
+
+
+@njit(cache=True, error_model="numpy")
+def _leg_ends(ways, legs, i):
+    """Both ends of leg i."""
+    begin = leg_end(ways[i], ways[i].V, legs[i].j, True)
+    return begin, leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
 
 
 @njit(cache=True, error_model="numpy")
@@ -113,16 +126,11 @@ def needed(ways, legs):
 def _cap(ways, legs, room):
     """Lower the speeds of the ways, in place, as `capped` says."""
     for i in range(1, len(ways) - 1):
-        way = ways[i]
-        low, high = 0.0, way.V
-        trial = high
+        way, low, high, trial = ways[i], 0.0, ways[i].V, ways[i].V
         for _ in range(BISECTIONS):
             before, after = leg_end(way, trial, legs[i - 1].j, False), leg_end(way, trial, legs[i].j, True)
-            if (
-                before.corner + max(before.ramp, after.ramp) <= room[i]
-                and before.top <= legs[i - 1].v
-                and after.top <= legs[i].v
-            ):
+            fits = before.corner + max(before.ramp, after.ramp) <= room[i]
+            if fits and before.top <= legs[i - 1].v and after.top <= legs[i].v:
                 low = trial
                 if trial == high:
                     break
@@ -134,11 +142,8 @@ def _cap(ways, legs, room):
 
 @njit(cache=True, error_model="numpy")
 def _lowered(way, V, behind, fixed, leg):
-    """The largest speed up to V with which a leg is feasible towards its other end `fixed`, but not below
-    that end's W.
-
-    behind : True if the joint passed at V is the one that the leg begins at
-    """
+    """The largest speed up to V at which a leg begins (`behind`), or ends, feasible towards its other end `fixed`; but
+    not below that end's W."""
     here = leg_end(way, V, leg.j, behind)
     if here.top <= fixed.top or _feasible(here, fixed, leg, 0.0):
         return V
@@ -178,10 +183,7 @@ def _sweep(ways, legs):
 @njit(cache=True, error_model="numpy")
 def _between(ways, first, last, legs):
     """Time [s] from the joint `first` to the joint `last`, the corner at that one not counted; inf if that is
-    impossible.
-
-    In between there is no corner: there the speeds of the ways are lowered, in place, to the largest ones.
-    """
+    impossible. In between there is no corner: there the speeds are lowered, in place, to the largest ones."""
     for i in range(first, last - 1):
         fixed = leg_end(ways[i], ways[i].V, legs[i].j, True)
         ways[i + 1].V = _lowered(ways[i + 1], ways[i + 1].V, False, fixed, legs[i])
@@ -190,8 +192,7 @@ def _between(ways, first, last, legs):
         ways[i].V = _lowered(ways[i], ways[i].V, True, fixed, legs[i])
     time = 0.0
     for i in range(first, last):
-        one = leg_end(ways[i], ways[i].V, legs[i].j, True)
-        other = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
+        one, other = _leg_ends(ways, legs, i)
         if not _feasible(one, other, legs[i], LENGTH_ROUNDING):
             return np.inf
         time += leg_time(one, other, legs[i])
@@ -229,20 +230,7 @@ def _choose(rows, straight, legs):
     for n in range(1, len(corners)):
         _between(ways, corners[n - 1], corners[n], legs)
         for i in range(corners[n - 1], corners[n]):
-            one = leg_end(ways[i], ways[i].V, legs[i].j, True)
-            other = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
+            one, other = _leg_ends(ways, legs, i)
             lasting = corner_at(ways[i + 1], ways[i + 1].V, True)[2]
             time[i + 1] = time[i] + lasting + leg_time(one, other, legs[i])
     return ways, time
-
-
-@njit(cache=True, error_model="numpy")
-def _moves(ways, legs, duration, jerk):
-    """Write durations and jerks of `moves` into duration and jerk (n, 8)."""
-    phases = np.empty((2, PHASES))
-    for i in range(len(legs)):
-        one = leg_end(ways[i], ways[i].V, legs[i].j, True)
-        other = leg_end(ways[i + 1], ways[i + 1].V, legs[i].j, False)
-        leg_phases(one, other, legs[i], phases)
-        duration[i, 0] = corner_at(ways[i], ways[i].V, True)[2]
-        duration[i, 1:], jerk[i, 1:] = phases[0], phases[1]

@@ -110,12 +110,8 @@ def ramp(start, gain, a, j):
 
 @njit(cache=True, error_model="numpy")
 def corner_at(way, V, behind):
-    """A corner passed at V [mm/s]: start deceleration A [mm/s2], length [mm] that it takes of a leg, duration
-    [s].
-
-    way    : record `WAY`
-    behind : True for the leg behind the corner, False for the one before
-    """
+    """A corner (record `WAY`) passed at V [mm/s]: start deceleration A [mm/s2], length [mm] that it takes of the leg
+    `behind` it or of the one before, duration [s]."""
     if V <= 0.0 or way.kind in (STOP, PASS):
         return 0.0, 0.0, 0.0
     if way.kind == CONSTANT:
@@ -129,11 +125,7 @@ def corner_at(way, V, behind):
 
 @njit(cache=True, error_model="numpy")
 def leg_end(way, V, j, behind):
-    """The `End` of a leg with jerk j [mm/s3] at a joint passed at V [mm/s].
-
-    way    : record `WAY`
-    behind : True for the leg behind the joint, False for the one before
-    """
+    """The `End` of the leg `behind` a joint (record `WAY`) passed at V [mm/s], or of the one before, with jerk j [mm/s3]."""
     A, length, _ = corner_at(way, V, behind)
     lost, time = 0.5 * A * A / j, A / j
     pre = time * (V - lost) + A * time * time / 6.0
@@ -142,10 +134,8 @@ def leg_end(way, V, j, behind):
 
 @njit(cache=True, error_model="numpy")
 def leg_top(one, other, leg):
-    """Highest speed W on a leg [mm/s], how far it is above each end's V' [mm/s], and the length that is left
-    to be run at it [mm].
-
-    one, other, leg : `End`, `End`, record `LEG`
+    """Highest speed W on a leg (record `LEG`) between its ends (`End`) [mm/s], how far it is above each end's V' [mm/s],
+    and the length that is left to be run at it [mm].
 
     The unknown is how far the speed is above the higher end, not the speed itself: a gain of 1e-10 mm/s is
     lost in the rounding of 100 mm/s, but takes 2e-8 s at 1e6 mm/s3.
@@ -165,10 +155,7 @@ def leg_top(one, other, leg):
     for _ in range(NEWTON_STEPS):
         ramp1, ramp2 = ramp(one.start, first + gain, a, j), ramp(other.start, second + gain, a, j)
         miss = ramp1[0] + ramp2[0] - D
-        if miss > 0.0:
-            high = gain
-        else:
-            low = gain
+        low, high = (low, gain) if miss > 0.0 else (gain, high)
         if abs(miss) <= ROUNDING * D:
             break
         gain -= miss / (ramp1[2] + ramp2[2])

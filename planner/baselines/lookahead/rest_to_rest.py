@@ -98,9 +98,8 @@ def _fastest(
         left = times[0] < times[1]
         low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
         new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
-        of_new = time(new)
-        inner = [np.where(left, new, inner[1]), np.where(left, inner[0], new)]
-        times = [np.where(left, of_new, times[1]), np.where(left, times[0], of_new)]
+        for two, there in ((inner, new), (times, time(new))):
+            two[:] = np.where(left, there, two[1]), np.where(left, two[0], there)
     speed = np.exp(np.where(times[0] < times[1], inner[0], inner[1]))
     return speed, product / speed
 
@@ -113,11 +112,8 @@ class Parts(NamedTuple):
 
 
 def parts_of(toolpath: Toolpath, join_lines: bool = False) -> Parts:
-    """The parts of a path of M segments. A move is a block, or a part of a spline between kinks and jumps of
-    its curvature, at which a motion cannot go on without a jump of its acceleration.
-
-    join_lines : lines that go straight on are one move, wherever a line is cut into blocks
-    """
+    """The parts of a path of M segments. A move is a block, or a part of a spline between kinks and jumps of its curvature,
+    at which a motion's acceleration would jump; with `join_lines` lines that go straight on are one, too."""
     first = np.arange(len(toolpath) + 1)
     curve, on = toolpath.curve >= 0, np.zeros(len(first), bool)
     if curve.any():
@@ -134,10 +130,7 @@ def parts_of(toolpath: Toolpath, join_lines: bool = False) -> Parts:
 def stop_phases(
     toolpath: Toolpath, machine: Machine, parts: Parts, length: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Speed (P,) at the start of each part [mm/s], durations [s] and jerks [mm/s3] (P, F) of its phases.
-
-    length : (P,) of the parts [mm]
-    """
+    """Speed (P,) at the start of each part of a `length` (P,) [mm], [mm/s]; durations [s], jerks [mm/s3] (P, F) of its phases."""
     v, a, j = _limits(toolpath, machine, parts)
     if parts.still.all():
         return np.zeros(len(length)), *rest_to_rest_phases(length, v, a, j)

@@ -68,7 +68,7 @@ class KinematicMethod(Method):
             # legs alone could keep tangential limits, corners would not begin as they end
             machine = job.machine.model_copy(update={TANGENTIAL.key: None, TANGENTIAL_JERK.key: None})
             chain = self._chain(job.toolpath, machine, exact)
-            motion = _motion(chain, job.toolpath.axes, job.toolpath.radius)
+            motion = _motion(chain)
         made = job.deliver_in_time(motion, as_it_is=self.start_stop > 0)
         return job.plan(
             made,
@@ -156,23 +156,11 @@ def _slower_than_stops(chain: _Chain, toolpath: Toolpath, machine: Machine) -> A
     return np.repeat(lasting > np.add.reduceat(times, first[:-1]), np.diff(first))
 
 
-def _motion(chain: _Chain, axes: tuple[str, ...], radius: float) -> AxisMotion:
+def _motion(chain: _Chain) -> AxisMotion:
     """The pieces of legs and corners, along the axes."""
     pieces = corner_pieces(chain.passage, chain.legs, chain.path, chain.lines.dwell[chain.path.first])
-    position, velocity, acceleration, jerk = along_axes(pieces, chain.path, chain.lines)
-    end = np.cumsum(pieces.duration)
-    return AxisMotion(
-        axes=axes,
-        radius=radius,
-        t=np.insert(end[:-1], 0, 0.0),
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-        block=chain.lines.block[pieces.segment],
-        line=chain.lines.line[pieces.segment],
-        end=float(end[-1]),
-    )
+    state, end = along_axes(pieces, chain.path, chain.lines), np.cumsum(pieces.duration)
+    return AxisMotion.of(state, np.insert(end[:-1], 0, 0.0), float(end[-1]), chain.lines, pieces.segment)
 
 
 def _sentence(chain: _Chain) -> str:

@@ -12,7 +12,7 @@ from benchmarks.jobs import problems
 from planner.baselines.fir.chord_guide import guide_of_path
 from planner.baselines.fir.chord_speeds import promised
 from planner.baselines.fir.fastest_schedule import plan_for
-from planner.baselines.fir.guide import per_leg
+from planner.baselines.fir.guide import per
 from planner.baselines.fir.slow_down import RATIO_ROUNDING, WORTH, SpeedPlan, make, settled_fastest, slow_down
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -90,6 +90,6 @@ def test_each_run_gets_the_plan_that_is_fastest_for_it(plans):
 
 
 def test_columns_of_the_wrong_length_are_refused(plans):
-    assert per_leg().metadata["rows"] == "leg"
+    assert per("leg").metadata["rows"] == "leg"
     with pytest.raises(ValueError, match="expected"):
         dataclasses.replace(plans[0], T1=np.ones(7))

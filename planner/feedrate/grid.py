@@ -26,8 +26,8 @@ from dataclasses import replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.feedrate.constraints import axis_jerk
 from planner.feedrate.constraints.assemble import feedrate_problem, interval_feed_sq_max
+from planner.feedrate.constraints.axis_limits import feed_sq_at_constant_speed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.sampling.path_samples import PathSamples
@@ -107,7 +107,7 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
 def _slow_at_corners(problem: FeedrateProblem) -> FeedrateProblem:
     """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among its feed bounds."""
     d3 = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right))
-    allowed = axis_jerk.feed_sq_at_constant_speed(d3, problem.jerk_limit)
+    allowed = feed_sq_at_constant_speed(d3, problem.jerk_limit)
     return replace(problem, feed_sq_max=np.minimum(problem.feed_sq_max, allowed))
 
 

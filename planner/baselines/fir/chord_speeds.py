@@ -49,7 +49,7 @@ from planner.baselines.fir.guide import per_leg, per_run
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import BEYOND, Made, SpeedPlan, settled_fastest, slowing
 from planner.corners.fir import overlap_time
-from planner.feedrate.constraints import filter_error, phase_lag
+from planner.feedrate.constraints.curvature_limits import feed_sq_of_filters, feed_sq_of_lag
 from planner.machine import Machine
 
 # Rounds until everything gets slower with the filters at their longest, so that it ends.
@@ -170,7 +170,7 @@ def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) ->
     kappa  : (n,) curvature [1/mm]
     T1, T2 : (n,) filters [s]
     """
-    return np.sqrt(filter_error.feed_sq_max(kappa, tol, (T1, T2)))
+    return np.sqrt(feed_sq_of_filters(kappa, tol, (T1, T2)))
 
 
 def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
@@ -179,7 +179,7 @@ def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> Float
     kappa  : (n,) curvature [1/mm]
     T1, T2 : (n,) filters [s]
     """
-    return np.sqrt(phase_lag.feed_sq_max(kappa, phi, (T1, T2)))
+    return np.sqrt(feed_sq_of_lag(kappa, phi, (T1, T2)))
 
 
 def filter_lengths(

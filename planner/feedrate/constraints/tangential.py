@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.feedrate.constraints.axis_acceleration import AxisAcceleration
-from planner.feedrate.constraints.axis_jerk import AxisJerk
+from planner.feedrate.constraints.axis_limits import AxisAcceleration, AxisJerk
 from planner.feedrate.constraints.limit import Limit
 from planner.machine import LINEAR_AXES, TANGENTIAL, Machine
 from planner.machine.user_limit import PathLimit, Place

@@ -4,22 +4,10 @@ import numpy as np
 
 from planner.base.kernels import njit
 from planner.smoothing.basis import ORDER, derivatives
-from planner.smoothing.sites import control_first, run_knots
 
 # Gauss-Legendre rule of three points on [0, 1], exact for squares of third derivatives, degree 4.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, NODE_WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
-
-
-@njit(cache=True, error_model="numpy")
-def third_derivative_bands(splines, weights):
-    """(A, n, 6) bands of the integrals of the squared third derivatives times weights (A,) along all runs
-    [1/mm5]: 1/2 c'Hc of the control points c [mm] is the integral [1/mm3]."""
-    H = np.zeros((len(weights), len(splines.control), ORDER))
-    for q in range(len(splines.fits)):
-        knots, begin = run_knots(splines, q), control_first(splines, q)
-        add_third_derivatives(knots, weights, H[:, begin:])
-    return H
 
 
 @njit(cache=True, error_model="numpy")

@@ -14,10 +14,10 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 from planner.base.sizes import SIZES
 from planner.base.threads import in_parts
-from planner.smoothing.basis import DEGREE, Knots, put, put_rows
+from planner.smoothing.basis import DEGREE, ORDER, Knots, put, put_rows
 from planner.smoothing.certificate import certify
 from planner.smoothing.corridor import Corridor, run_corridor
-from planner.smoothing.forms import third_derivative_energy
+from planner.smoothing.forms import add_third_derivatives, third_derivative_energy
 from planner.smoothing.initial import greville_control
 from planner.smoothing.interior_point import Accuracy, Problem, minimise_in_corridor
 from planner.smoothing.runs import SplineRuns
@@ -48,10 +48,9 @@ SPANS_SHARED = SIZES.relaxed_shared
 
 
 class Goal(NamedTuple):
-    """The aim of the control points c of all runs: the least 1/2 c'Hc, the integral of the squared third
-    derivatives, to a gap that is a share of it."""
+    """The aim of the control points: the least integral of the squared third derivatives, to a gap that is a
+    share of it."""
 
-    H: FloatArray  # (A, n, 6) lower bands of all runs
     relative: float
     axis_weights: FloatArray  # (A,) of the squared third derivatives
     reach: Reach
@@ -139,7 +138,8 @@ def _relax(corridor, splines, runs, goal, own, found):
         knots, start = run_knots(splines, q), run_control(splines, q).copy()
         sites = run_sites(splines, q)
         begin, along = control_first(splines, q), run_corridor(corridor, q)
-        middle, H = greville_control(along, knots.breaks), goal.H[:, begin : begin + len(start)].copy()
+        middle, H = greville_control(along, knots.breaks), np.zeros((start.shape[1], len(start), ORDER))
+        add_third_derivatives(knots, goal.axis_weights, H)
         inside = with_radius(sites, USED * sites.radius)
         run = Run(along, knots, inside, H, middle, runs.fixed_first[q], runs.fixed_last[q])
         start += (1.0 - AGAIN) * (middle - start)

@@ -199,8 +199,7 @@ def one_run():
 @pytest.fixture
 def loose_knots(monkeypatch):
     """No knots are added, so that first splines use more of the tolerance than `ROOM`."""
-    for kernel in ("_lay", "_lay_run"):
-        monkeypatch.setattr(lay, kernel, getattr(lay, kernel).py_func)
+    monkeypatch.setattr(lay, "_lay_run", lay._lay_run.py_func)
     monkeypatch.setattr(lay, "DENSER_MAX", 0)
     monkeypatch.setattr(lay, "ROOM", 0.3)
 

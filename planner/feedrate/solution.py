@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import FloatArray, freeze
 from planner.base.errors import NotSolvedError
 from planner.feedrate.constraints.limit import RowLimit, RowPoint
 from planner.feedrate.constraints.limits import ACCELERATION, JERK, ROWS
@@ -162,23 +162,11 @@ def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
     return times
 
 
-def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> tuple[FloatArray, Array]:
-    """How close the profile comes to its limits, and to which.
-
-    Returns the largest ratio (P,) of any constraint at each point or at either end of the interval to its
-    right (1 = active), and the constraint's index (P,) in `active_names`. Jerk counts for jerk-limited
-    solutions only. Solver-independent: computed from the profile alone.
-    """
-    worst, which = np.zeros(len(problem)), problem.feed_sq_bound.copy()
-    for limit, ratio in ratios_by_limit(problem, solution):
-        better = ratio > worst
-        worst[better], which[better] = ratio[better], limit
-    return worst, which
-
-
 def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Iterator[tuple[int, FloatArray]]:
-    """For every constraint its index in `active_names` and the profile's ratios (P,) to it, as in
-    `constraint_ratios`; of the bounds on feed^2 only the smallest at each point has a ratio there."""
+    """For every constraint its index in `active_names` and how close the profile comes to it (1 = active): the
+    ratio (P,) at each point or at either end of the interval to its right, computed from the profile alone. Of
+    the bounds on feed^2 only the smallest at each point has a ratio there; jerk counts for jerk-limited solutions
+    only."""
     x, u = solution.require().feed_sq, solution.acc_s
     for bound in range(len(problem.bound_names)):
         yield bound, np.where(problem.feed_sq_bound == bound, x / problem.feed_sq_limit, 0.0)
@@ -207,5 +195,5 @@ def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Ite
 
 
 def active_names(problem: FeedrateProblem) -> tuple[str, ...]:
-    """Names for the indices of `constraint_ratios`."""
+    """Names for the indices of `ratios_by_limit`."""
     return problem.bound_names + tuple(limit.called(axis) for limit in ROWS for axis in problem.axes)

@@ -2,10 +2,9 @@
 
 The control points of the first spline are the places of the corridor's chain at the spline's Greville
 abscissae: a smoothed chain that leaves it only at corners, and the less, the denser the knots are. Where it
-uses more than `ROOM` of the tolerance, knots are added, which moves the knots of the whole run a little: on a
-run of 100,000 corners some site always ends a little beyond `ROOM`. That does no harm: what is within
-`INSIDE` of the tolerance is a start for the relaxation (relax.py). Only spans with sites outside of that are
-no spline, and the run is to be cut there (spline_path.py).
+uses more than `ROOM` of the tolerance, knots are added, `DENSER_MAX` times at most. What is within `INSIDE` of
+it is a start for the relaxation (relax.py). Only spans with sites outside of that are no spline, and the run
+is to be cut there (spline_path.py).
 
 Knots are near to each other where the path turns much within its tolerance. A control polygon that follows
 the path leaves it by about a quarter of the turning between two knots times their distance. So knots stand at

@@ -14,10 +14,9 @@ from planner.machine import Machine
 from planner.smoothing.basis import ORDER, derivatives
 from planner.smoothing.corridor import Corridor, find_corridor
 from planner.smoothing.initial import lay
-from planner.smoothing.relax import Goal, relax
+from planner.smoothing.relax import REACH, Goal, relax
 from planner.smoothing.runs import SplineRuns, find_runs, longest_span
 from planner.smoothing.sites import Sites, Splines, run_control, run_knots
-from planner.smoothing.windows import REACH
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
 CUSP_PLACES = 17  # ... looked for at so many places per span: |p_u|^2 is of degree 8, with two places for each of its extremes

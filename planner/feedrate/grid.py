@@ -13,12 +13,10 @@ A jerk-limited profile rounds switches off: on an element of length L, with limi
 
     tau = min(a/j, (L / (16 j))^(1/3)),
 
-which is the time to build up a, or half a phase of the move from rest to rest that never reaches a (8 tau in
-all). The second-order profile with the acceleration j tau, as slow at corners as the jerk asks for at
-constant speed, tells when and where things happen; between its events the points are spread in time, every
-`STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between:
-step/distance stays STEP/NEAR. So an element from rest to rest takes some 30 points if it is short, and each
-tenfold length only about 20 more.
+the time to build up a, or half a phase of the move from rest to rest that never reaches a. The second-order
+profile with the acceleration j tau, as slow at corners as the jerk asks for at constant speed, tells when and
+where things happen; between its events the points are spread in time, every `STEP` tau for the first `NEAR`
+tau after an event and before the next, and ever wider in between: step/distance stays STEP/NEAR.
 """
 
 from dataclasses import replace

@@ -67,8 +67,7 @@ class FeedrateSolution:
 
     def __post_init__(self) -> None:
         points = len(self.feed_sq)
-        for name in ("feed_sq", "acc_s", "jerk_s"):
-            freeze(self, name, np.float64, (points,), finite=self.solved)
+        freeze(self, "feed_sq acc_s jerk_s", np.float64, (points,), finite=self.solved)
         freeze(self, "duration", np.float64, (points,), finite=False)
 
     @property
@@ -98,11 +97,8 @@ class FeedrateSolution:
         solver: str,
         solve_time: float,
     ) -> FeedrateSolution:
-        """A second-order optimum: constant acceleration on every interval.
-
-        feed_sq : (P,) [mm2/s2]
-        acc_s   : (P,) acceleration along the path on the interval to the right [mm/s2]
-        """
+        """A second-order optimum: constant acceleration `acc_s` (P,) on the interval to the right [mm/s2], `feed_sq`
+        (P,) [mm2/s2]."""
         return cls(
             status=Status.OPTIMAL,
             sentence=sentence,
@@ -148,12 +144,8 @@ class FeedrateSolver(Protocol):
 
 
 def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
-    """(P,) time [s] to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1}).
-
-    0 at the end of a piece. Solutions carry their own `duration`, exact at any order.
-
-    feed_sq : (P,) [mm2/s2]
-    """
+    """(P,) time [s] to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1}), 0 at the
+    end of a piece; `feed_sq` (P,) [mm2/s2]."""
     feed = np.sqrt(feed_sq)
     times = np.zeros(len(problem))
     inner = np.flatnonzero(problem.interval)

@@ -47,13 +47,9 @@ class _Row(PathLimit):
         both = (AxisAcceleration.name, largest), (AxisJerk.name, fastest)
         self.bounded = tuple(name for name, bound in both if np.isfinite(bound))
 
-    def acceleration(self, at: Place) -> Any:
-        """The same everywhere [mm/s2]."""
-        return self.largest
-
-    def jerk(self, at: Place) -> Any:
-        """The same everywhere [mm/s3]."""
-        return self.fastest
+    def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        """The same everywhere [mm/s2], [mm/s3]."""
+        return np.inf, self.largest, self.fastest
 
 
 class TangentialAcceleration(Limit):

@@ -198,7 +198,8 @@ def one_run():
 @pytest.fixture
 def loose_knots(monkeypatch):
     """No knots are added, so that first splines use more of the tolerance than `ROOM`."""
-    monkeypatch.setattr(lay, "_lay_run", lay._lay_run.py_func)
+    kernel = "_lay_run"
+    monkeypatch.setattr(lay, kernel, getattr(lay, kernel).py_func)
     monkeypatch.setattr(lay, "DENSER_MAX", 0)
     monkeypatch.setattr(lay, "ROOM", 0.3)
 

@@ -76,7 +76,7 @@ def user_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) 
     margin[at] = MARGIN_SAFETY * np.max(errors, axis=0)
     divided[at] = np.any(coarse, axis=0) & (samples.s[at + 1] - samples.s[at] > LEAST)
     stacked = (np.stack(one, axis=1) for one in zip(*columns, strict=True))
-    return UserRows(*stacked, margin, divided)
+    return UserRows._make((*stacked, margin, divided))
 
 
 def _real_bounds(

@@ -17,6 +17,7 @@ from benchmarks.campaign import axes as axes_campaign
 from benchmarks.controls import planned_ngc
 from benchmarks.cost import growth, long_jobs
 from benchmarks.jobs import five_axis, problems, published, random_lines
+from benchmarks.jobs.nurbs_chords import chord_program
 from benchmarks.runner import grids, nasty
 from benchmarks.solvers.random_paths import COPP_LIMITS, CURVES, copp_spline
 from planner.base.names import METHODS
@@ -121,7 +122,7 @@ def curve(name: str) -> Nurbs:
 
 def chords(name: str, machine: Machine) -> Program:
     """A curve of curves.json as chords within a tenth of the machine's tolerance."""
-    return curve(name).to_program(CURVE_CHORDS * machine.tolerance, problems.FEED)
+    return chord_program(curve(name), CURVE_CHORDS * machine.tolerance, problems.FEED)
 
 
 def papers() -> list[Job]:

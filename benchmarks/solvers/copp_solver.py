@@ -22,7 +22,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.reference.exact_motion import slowed_to_limits, with_exact_kinematics
+from planner.feedrate.reference.piecewise import slowed_to_limits, with_exact_kinematics
 from planner.feedrate.solution import FeedrateSolution, Status
 
 INSTALL = "copp-py is not installed (pip install '.[bench]'): its columns are left out"
@@ -103,7 +103,7 @@ class CoppSocp:
 
 @dataclass(frozen=True, kw_only=True)
 class CoppMotion:
-    """Copp for whole plans: every piece by `CoppSocp`, then brought onto constant jerks within all limits (exact_motion.py).
+    """Copp for whole plans: every piece by `CoppSocp`, then brought onto constant jerks within all limits (piecewise.py).
 
     solver : for one piece
     """

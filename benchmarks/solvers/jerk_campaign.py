@@ -19,10 +19,11 @@ from rich.progress import track
 from scipy.interpolate import make_interp_spline
 
 from benchmarks.record import write_results
+from benchmarks.solvers.ratios import constraint_ratios
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reference.nlp import JerkLimitedNLP
-from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
+from planner.feedrate.solution import FeedrateSolution, Status
 
 LIMIT_ROUNDING = 1e-6  # a limit holds if it is exceeded by no more than this [-]
 GAP_MAX = 3e-3  # above ipopt's time [-]

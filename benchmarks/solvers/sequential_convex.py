@@ -70,14 +70,15 @@ from benchmarks.solvers.near_rest import NODES, WEIGHTS, IntervalShape, beside_r
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.reference.exact_motion import slowed_to_limits, with_exact_kinematics
 from planner.feedrate.reference.piecewise import (
     INTERVALS_MIN,
     Found,
+    slowed_to_limits,
     solution_of,
     solve_pieces,
     too_few,
     too_large,
+    with_exact_kinematics,
 )
 from planner.feedrate.solution import FeedrateSolution, Status
 

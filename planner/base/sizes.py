@@ -65,7 +65,6 @@ class Sizes:
     # Splines.
     relaxed_window: int = _size(ROUTES, 240, 120)  # control points relaxed at a time ...
     relaxed_overlap: int = _size(ROUTES, 30, 30)  # ... and of them again with the next window
-    laid_range: int = _size(ROUTES, 4_000, 20)  # vertices; runs of fewer than two are laid as a whole
 
     # The feedrate along a path, and the search for path and feedrate together.
     solved_window: int = _size(ROUTES, 2_000, 120)  # intervals solved at a time

@@ -73,19 +73,14 @@ def phase_times(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> tuple[Floa
 
 
 def approach(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
-    """(n,) approach length l [mm], from the corner's start to the vertex.
-
-    V, alpha, eta : (n,) as of `phase_times`
-    """
+    """(n,) approach length l [mm], from the corner's start to the vertex; V, alpha, eta (n,) as of `phase_times`."""
     T1, T2 = phase_times(V, alpha, eta)
     return V * (T1 + T2) / 2
 
 
 def middle(V: FloatArray, alpha: FloatArray, eta: FloatArray) -> FloatArray:
-    """(n,) middle value m [mm]: the corner misses the vertex by eps = 2 sin(theta/2) m (eq. (3), (6)).
-
-    V, alpha, eta : (n,) as of `phase_times`
-    """
+    """(n,) middle value m [mm]: the corner misses the vertex by eps = 2 sin(theta/2) m (eq. (3), (6)); V, alpha,
+    eta (n,) as of `phase_times`."""
     T1, T2 = phase_times(V, alpha, eta)
     return V * (3 * T1**2 + T2**2) / (24 * T1)
 

@@ -6,9 +6,6 @@ is too short is cut where both of its corners would be equally fast: d_i g_i = d
 corner getting more. What a corner then cannot use, because its tolerance or its other leg stops it, goes to
 the neighbour in a few rounds. Every round treats both ends alike, so reversing the path reverses the result;
 every round keeps all legs feasible, so stopping early is safe.
-
-Paper 002's five-point example: corner 1 keeps its full d = 0.292 mm on a leg of 0.5 mm, where L/2 would cap
-it at 0.25.
 """
 
 import numpy as np

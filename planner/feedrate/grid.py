@@ -13,12 +13,10 @@ A jerk-limited profile rounds switches off: on an element of length L, with limi
 
     tau = min(a/j, (L / (16 j))^(1/3)),
 
-which is the time to build up a, or half a phase of the move from rest to rest that never reaches a (8 tau in
-all). The second-order profile with the acceleration j tau, as slow at corners as the jerk asks for at
-constant speed, tells when and where things happen; between its events the points are spread in time, every
-`STEP` tau for the first `NEAR` tau after an event and before the next, and ever wider in between:
-step/distance stays STEP/NEAR. So an element from rest to rest takes some 30 points if it is short, and each
-tenfold length only about 20 more.
+the time to build up a, or half a phase of the move from rest to rest that never reaches a. The second-order
+profile with the acceleration j tau, as slow at corners as the jerk asks for at constant speed, tells when and
+where things happen; between its events the points are spread in time, every `STEP` tau for the first `NEAR`
+tau after an event and before the next, and ever wider in between: step/distance stays STEP/NEAR.
 """
 
 from dataclasses import replace
@@ -26,8 +24,8 @@ from dataclasses import replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.feedrate.constraints import axis_jerk
 from planner.feedrate.constraints.assemble import feedrate_problem, interval_feed_sq_max
+from planner.feedrate.constraints.axis_limits import feed_sq_at_constant_speed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.sampling.path_samples import PathSamples
@@ -107,7 +105,7 @@ def refine_for_jerk(samples: PathSamples, machine: Machine, finer: float = 1.0) 
 def _slow_at_corners(problem: FeedrateProblem) -> FeedrateProblem:
     """The problem with what jerks allow at constant speed, |r'''_k| v^3 <= j_k, among its feed bounds."""
     d3 = np.maximum(np.abs(problem.d3_left), np.abs(problem.d3_right))
-    allowed = axis_jerk.feed_sq_at_constant_speed(d3, problem.jerk_limit)
+    allowed = feed_sq_at_constant_speed(d3, problem.jerk_limit)
     return replace(problem, feed_sq_max=np.minimum(problem.feed_sq_max, allowed))
 
 

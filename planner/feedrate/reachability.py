@@ -73,15 +73,6 @@ def axis_rows(problem: FeedrateProblem) -> AxisRows:
     return AxisRows(problem.d1, problem.d2_left, problem.d2_right, problem.acceleration_limit)
 
 
-def _bounds_of(problem: FeedrateProblem) -> Bounds:
-    return Bounds(
-        piece=problem.piece,
-        s=problem.s,
-        margin=problem.margin,
-        x_max=problem.feed_sq_limit,
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
 class Reachability:
     """The numba reachability solver; it has no settings."""
@@ -89,7 +80,8 @@ class Reachability:
     def solve(self, problem: FeedrateProblem) -> FeedrateSolution:
         """Time-optimal second-order profile."""
         began = time.perf_counter()
-        x, u = _solve(axis_rows(problem), _bounds_of(problem))
+        bounds = Bounds(problem.piece, problem.s, problem.margin, problem.feed_sq_limit)
+        x, u = _solve(axis_rows(problem), bounds)
         took = time.perf_counter() - began
         if not (np.isfinite(x).all() and np.isfinite(u).all()):
             sentence = "the profile is not finite; check the path for points that coincide"
@@ -183,17 +175,6 @@ def largest_feed_sq(rows, on, x_max):
 
 
 @njit(cache=True, error_model="numpy")
-def _backward(rows, bounds, g, reach):
-    """Write K of piece g into reach (P,)."""
-    s, margin, x_max = bounds.s, bounds.margin, bounds.x_max
-    first, last = bounds.piece[g], bounds.piece[g + 1] - 1
-    reach[last] = 0.0
-    for i in range(last - 1, first - 1, -1):
-        on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])
-        reach[i] = largest_feed_sq(rows, on, x_max[i])
-
-
-@njit(cache=True, error_model="numpy")
 def _solve(rows, bounds):
     """Backward and forward pass over all pieces; returns x and u."""
     piece, s, margin, x_max = bounds
@@ -201,7 +182,10 @@ def _solve(rows, bounds):
     reach, x, u = np.empty(points), np.empty(points), np.zeros(points)
     for g in range(len(piece) - 1):
         first, last = piece[g], piece[g + 1] - 1
-        _backward(rows, bounds, g, reach)
+        reach[last] = 0.0
+        for i in range(last - 1, first - 1, -1):
+            on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])
+            reach[i] = largest_feed_sq(rows, on, x_max[i])
         x[first] = 0.0
         for i in range(first, last):
             on = Interval(i, s[i + 1] - s[i], 1.0 - margin[i], reach[i + 1])

@@ -18,7 +18,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.feedrate.constraints.problem import FeedrateProblem
-from planner.feedrate.jerk.columns import columns_of
+from planner.feedrate.jerk.layout import columns_of
 from planner.feedrate.jerk.rows import duration
 from planner.feedrate.solution import FeedrateSolution
 

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import FloatArray, freeze
 from planner.base.errors import NotSolvedError
 from planner.feedrate.constraints.limit import RowLimit, RowPoint
 from planner.feedrate.constraints.limits import ACCELERATION, JERK, ROWS
@@ -67,8 +67,7 @@ class FeedrateSolution:
 
     def __post_init__(self) -> None:
         points = len(self.feed_sq)
-        for name in ("feed_sq", "acc_s", "jerk_s"):
-            freeze(self, name, np.float64, (points,), finite=self.solved)
+        freeze(self, "feed_sq acc_s jerk_s", np.float64, (points,), finite=self.solved)
         freeze(self, "duration", np.float64, (points,), finite=False)
 
     @property
@@ -98,11 +97,8 @@ class FeedrateSolution:
         solver: str,
         solve_time: float,
     ) -> FeedrateSolution:
-        """A second-order optimum: constant acceleration on every interval.
-
-        feed_sq : (P,) [mm2/s2]
-        acc_s   : (P,) acceleration along the path on the interval to the right [mm/s2]
-        """
+        """A second-order optimum: constant acceleration `acc_s` (P,) on the interval to the right [mm/s2], `feed_sq`
+        (P,) [mm2/s2]."""
         return cls(
             status=Status.OPTIMAL,
             sentence=sentence,
@@ -148,12 +144,8 @@ class FeedrateSolver(Protocol):
 
 
 def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
-    """(P,) time [s] to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1}).
-
-    0 at the end of a piece. Solutions carry their own `duration`, exact at any order.
-
-    feed_sq : (P,) [mm2/s2]
-    """
+    """(P,) time [s] to the right of each point at constant acceleration, 2 h / (feed_i + feed_{i+1}), 0 at the
+    end of a piece; `feed_sq` (P,) [mm2/s2]."""
     feed = np.sqrt(feed_sq)
     times = np.zeros(len(problem))
     inner = np.flatnonzero(problem.interval)
@@ -162,23 +154,11 @@ def interval_times(problem: FeedrateProblem, feed_sq: FloatArray) -> FloatArray:
     return times
 
 
-def constraint_ratios(problem: FeedrateProblem, solution: FeedrateSolution) -> tuple[FloatArray, Array]:
-    """How close the profile comes to its limits, and to which.
-
-    Returns the largest ratio (P,) of any constraint at each point or at either end of the interval to its
-    right (1 = active), and the constraint's index (P,) in `active_names`. Jerk counts for jerk-limited
-    solutions only. Solver-independent: computed from the profile alone.
-    """
-    worst, which = np.zeros(len(problem)), problem.feed_sq_bound.copy()
-    for limit, ratio in ratios_by_limit(problem, solution):
-        better = ratio > worst
-        worst[better], which[better] = ratio[better], limit
-    return worst, which
-
-
 def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Iterator[tuple[int, FloatArray]]:
-    """For every constraint its index in `active_names` and the profile's ratios (P,) to it, as in
-    `constraint_ratios`; of the bounds on feed^2 only the smallest at each point has a ratio there."""
+    """For every constraint its index in `active_names` and how close the profile comes to it (1 = active): the
+    ratio (P,) at each point or at either end of the interval to its right, computed from the profile alone. Of
+    the bounds on feed^2 only the smallest at each point has a ratio there; jerk counts for jerk-limited solutions
+    only."""
     x, u = solution.require().feed_sq, solution.acc_s
     for bound in range(len(problem.bound_names)):
         yield bound, np.where(problem.feed_sq_bound == bound, x / problem.feed_sq_limit, 0.0)
@@ -207,5 +187,5 @@ def ratios_by_limit(problem: FeedrateProblem, solution: FeedrateSolution) -> Ite
 
 
 def active_names(problem: FeedrateProblem) -> tuple[str, ...]:
-    """Names for the indices of `constraint_ratios`."""
+    """Names for the indices of `ratios_by_limit`."""
     return problem.bound_names + tuple(limit.called(axis) for limit in ROWS for axis in problem.axes)

@@ -5,11 +5,8 @@
     third order    own                 our interior-point kernel (feedrate/jerk/)
                    ipopt, fatrop       the problem as one nonlinear program, by casadi (feedrate/reference/nlp.py)
 
-A solver is its settings; one with other settings is taken wherever a name is. It has one method:
-
-    solve(problem, progress) -> FeedrateSolution      a profile with multipliers, or a status and a sentence that says what to do
-
-Sizes up to which each is sensible: docs/methods.md.
+A solver is its settings; one with other settings is taken wherever a name is. Sizes up to which each is
+sensible: docs/methods.md.
 """
 
 from collections.abc import Callable, Container, Mapping

@@ -1,28 +1,20 @@
 """The package toppra as a second solver of the same problem, to compare the own kernel with.
 
 toppra (H. Pham, MIT) solves one linear programme in (u, x) per grid point and pass with Seidel's method. It
-is given exactly the rows of `FeedrateProblem`: for every interval the left and the right end (|a u + b x| <=
-1 after division by the limit; see reachability.py), declared as "collocation" so that toppra interpolates
-nothing of its own. Its interpolation scheme would take one r'' per point, and a jump of the curvature would
-be lost.
+is given exactly the rows of `FeedrateProblem`, for the left and the right end of every interval (|a u + b x|
+<= 1 after division by the limit; see reachability.py), declared as "collocation": its interpolation scheme
+would take one r'' per point, and a jump of the curvature would be lost.
 
-What toppra 0.6 adds silently, in its own unscaled units, and what it would cost:
+toppra 0.6 adds silently, in its own units: bounds |u|, |x| <= 1e8 (a rapid of 10 m/s in mm/s is there); x_{i+1}
+lowered by min(1e-8, 1e-4 x_{i+1}) on every forward step, by which u_i and x_{i+1} - x_i then differ; the
+objective x - 1e-9 u; rows within 1e-10 of parallel are not intersected, and rows are met to 1e-10; and a walk
+of 1e10 along a row ends at "infinity", which a row without u (r'_k = 0) reaches: four of our six jobs failed
+as "uncontrollable" until u was given bounds of its own.
 
-    |u|, |x| <= 1e8                    bounds in Seidel's wrapper: a rapid of 10 m/s in mm/s is already at 1e8
-    x_{i+1} lowered by min(1e-8, 1e-4 x_{i+1})   on every forward step: 1e-4 of a small x (metres: every x below 1e-4 m2/s2)
-    objective x - 1e-9 u               instead of x: wrong vertex where 2 h < 1e-9
-    rows within 1e-10 of parallel      are not intersected; rows are met to 1e-10
-    u_i and x_{i+1} - x_i              differ by the lowering above
-    MAXU, MAXX = 1e4                   of constants.py act in other wrappers and in feasible sets, not here
-    a walk of 1e10 (normalised by     along a row ends at "infinity", and a row without u (r'_k = 0) walks so far: the pass fails as
-    the row) from the origin           "uncontrollable"; four of our six jobs did until u was given bounds of its own
-
-All of these are absolute, so the adapter chooses the units: the largest u is about 1 and the largest x about
-`FEED_SQ_SCALE`, so large that a slack of 1e-8 is 1e-14 of it and yet far from 1e8. The units are powers of
-two: scaling rounds nothing. What remains of the lowering is 1e-14 of the largest x per point, and u is
-toppra's own, which keeps the rows. Measured on the 200 random problems of the tests against the own kernel:
-cycle times differ by 3e-8, feeds by 2e-7 at worst; with the largest x at 1 instead by 3e-5 and 2e-4. On real
-paths 1e-12.
+So the adapter chooses the units: the largest u is about 1 and the largest x about `FEED_SQ_SCALE`, so large
+that a slack of 1e-8 is 1e-14 of it and yet far from 1e8; powers of two, so that scaling rounds nothing. On 200
+random problems cycle times then differ by 3e-8 from the own kernel's, feeds by 2e-7 at worst (with the largest
+x at 1 by 3e-5 and 2e-4), on real paths by 1e-12.
 """
 
 import logging

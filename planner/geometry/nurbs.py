@@ -1,4 +1,4 @@
-"""NURBS curves: points, and an NC program of the curve itself or of its chords.
+"""NURBS curves: points, and an NC program of the curve itself.
 
 A curve of degree p with points P_i, weights w_i, knots u_i: r(u) = sum N_i w_i P_i / sum N_i w_i.
 """
@@ -16,12 +16,6 @@ from planner.machine import LINEAR_AXES
 from planner.nc.bezier import DEGREE_MAX, cubic_pieces, homogeneous
 from planner.nc.points import CURVE, program_of_points
 from planner.nc.program import Kind, Program, SplineTable
-
-# Chords: how many of a span to begin with, halvings at most, places where they are measured [fraction].
-CHORDS_MIN, HALVINGS = 4, 40
-MEASURED = (0.25, 0.5, 0.75)
-# The deviation between these places may be larger; chords stay below this fraction of what is allowed [-].
-CHORD_SAFETY = 0.9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -68,11 +62,6 @@ class Nurbs:
         return LINEAR_AXES[: self.points.shape[1]]
 
     @cached_property
-    def breaks(self) -> FloatArray:
-        """(m+1,) the different knots of the domain."""
-        return np.unique(self.knots[self.degree : len(self.points) + 1])
-
-    @cached_property
     def _homogeneous(self) -> Any:
         """The spline of numerator and denominator."""
         from scipy.interpolate import BSpline  # 0.3 s, and few programs have a NURBS
@@ -84,47 +73,6 @@ class Nurbs:
         value = self._homogeneous(u)
         points: FloatArray = value[..., :-1] / value[..., -1:]
         return points
-
-    def stations(self, sagitta: float) -> FloatArray:
-        """(k,) parameters, all knots among them, between which chords are off by `sagitta` [mm] at most.
-
-        Raises InputError unless that is positive.
-        """
-        if not sagitta > 0:
-            raise InputError(f"chords with a deviation of {sagitta} mm; it must be positive")
-        ends = np.linspace(self.breaks[:-1], self.breaks[1:], CHORDS_MIN, endpoint=False, axis=1).ravel()
-        u = np.append(ends, self.breaks[-1])
-        for _ in range(HALVINGS):
-            wide = np.flatnonzero(self._deviation(u[:-1], u[1:]) > CHORD_SAFETY * sagitta)
-            if not len(wide):
-                break
-            u = np.insert(u, wide + 1, 0.5 * (u[wide] + u[wide + 1]))
-        return u
-
-    def _deviation(self, u0: FloatArray, u1: FloatArray) -> FloatArray:
-        """Distances of the curve from the chords between u0 and u1 (n,), the largest of three places."""
-        start, end = self.at(u0), self.at(u1)
-        chord = end - start
-        size_sq = np.maximum((chord**2).sum(axis=1), np.finfo(float).tiny)
-        worst = np.zeros(len(u0))
-        for fraction in MEASURED:
-            off = self.at(u0 + fraction * (u1 - u0)) - start
-            along = np.clip((off * chord).sum(axis=1) / size_sq, 0.0, 1.0)
-            worst = np.maximum(worst, np.linalg.norm(off - along[:, None] * chord, axis=1))
-        return worst
-
-    def to_program(self, sagitta: float, feed: float) -> Program:
-        """The curve as a program of G1 moves.
-
-        sagitta : largest distance of a chord from the curve [mm]; its ends are on the curve
-        feed    : programmed feed [mm/s]
-
-        Raises InputError unless both are positive and finite.
-        """
-        if not 0 < feed < np.inf:
-            raise InputError(f"feed {feed} mm/s; it must be positive and finite")
-        points = self.at(self.stations(sagitta))
-        return program_of_points(points, np.full(len(points) - 1, feed), None, CURVE, self.axes)
 
     def exact_program(self, feed: float) -> Program:
         """The curve itself as a program of one block, as G6.2 is read: every method plans it.

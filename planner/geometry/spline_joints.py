@@ -3,13 +3,9 @@
 A span stands for what is programmed between two places (geometry/spline.py), but only the run as a whole does
 so within the tolerance: its shape slides along the path, by several tolerances where that is faster. So the
 curve is matched with the path in order (geometry/point_matching.py), at points whose chords leave it by
-`CHORD_FRACTION` of the tolerance at most. A joint is passed where the curve C is nearest to it, V, as far as
-that keeps the order; joints that are within reach of each other at those places T_i that are together nearest
-to them:
-
-    least  sum_i |C(T_i) - V_i|^2,    T_1 <= T_2 <= ...,    (C - V) . C' = 0
-
-with V the mean of those that are passed together. Points of an arc that are `ARC_ANGLE` apart are passed
+`CHORD_FRACTION` of the tolerance at most. A joint V is passed where the curve C is nearest to it, (C - V) . C'
+= 0, next to where it was matched; those that would not be in order are passed together, V the mean of them.
+Points of an arc that are `ARC_ANGLE` apart are passed
 likewise. Behind the place of a joint the feed is that of the next block; it is found to rounding where the
 feed changes.
 """
@@ -144,64 +140,6 @@ def _nearest(spans, of, points, near, least, vertex, bisections, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _chord_apart_sq(point, n, vertex):
-    """Squared distance of a vertex from the chord behind point n."""
-    along, length_sq = 0.0, 0.0
-    for k in range(len(vertex)):
-        move = point[n + 1, k] - point[n, k]
-        along += (vertex[k] - point[n, k]) * move
-        length_sq += move * move
-    share, off_sq = min(max(along / length_sq, 0.0), 1.0) if length_sq > 0.0 else 0.0, 0.0
-    for k in range(len(vertex)):
-        off_sq += (point[n, k] + share * (point[n + 1, k] - point[n, k]) - vertex[k]) ** 2
-    return off_sq
-
-
-@njit(cache=True, error_model="numpy")
-def _nearest_together(point, vertices, budget, near):
-    """The chord (K,) on which each of K vertices is passed: those, in order, that are together nearest to
-    them (module text).
-
-    budget : (K,) [mm]
-    near   : (K,) a chord within the budget of each, overwritten; looked at are those that join on to it
-             within the budget
-    """
-    K, last = len(vertices), len(point) - 2
-    first, count = np.empty(K, np.int64), np.empty(K, np.int64)
-    for i in range(K):
-        low = high = min(near[i], last)
-        most = budget[i] * budget[i]
-        while low > 0 and _chord_apart_sq(point, low - 1, vertices[i]) <= most:
-            low -= 1
-        while high < last and _chord_apart_sq(point, high + 1, vertices[i]) <= most:
-            high += 1
-        first[i], count[i] = low, high - low + 1
-    for i in range(1, K):  # a later vertex is passed no earlier than the first chord of one before
-        if first[i] < first[i - 1]:
-            count[i] = max(first[i] + count[i] - first[i - 1], 1)
-            first[i] = first[i - 1]
-    begin = np.zeros(K + 1, np.int64)
-    begin[1:] = np.cumsum(count)
-    cost, at = np.empty(begin[K]), np.empty(begin[K], np.int64)  # least so far, and the chord it is on
-    for i in range(K):
-        before = 0.0
-        for m in range(count[i]):
-            n = first[i] + m
-            if i:
-                back = min(n - first[i - 1], count[i - 1] - 1)
-                before = cost[begin[i - 1] + back]
-            own = before + _chord_apart_sq(point, n, vertices[i])
-            if m and cost[begin[i] + m - 1] <= own:
-                cost[begin[i] + m], at[begin[i] + m] = cost[begin[i] + m - 1], at[begin[i] + m - 1]
-            else:
-                cost[begin[i] + m], at[begin[i] + m] = own, n
-    n = last
-    for i in range(K - 1, -1, -1):
-        near[i] = at[begin[i] + min(max(n - first[i], 0), count[i] - 1)]
-        n = near[i]
-
-
-@njit(cache=True, error_model="numpy")
 def _in_order_places(spans, of, points, near, marks, begin, end, out, passes):
     """The places (end - begin,) [mm] of the marks from `begin` on, each the nearest one next to the chord
     `near`. Where these are not in order the marks are passed together, at the place nearest to the mean of
@@ -268,11 +206,9 @@ def _pass_runs(spans, run_first, segments, chain, marks, place):
         if not matched:
             continue
         begin, end = marks.first[low[q]] + 1, marks.first[high[q]] + 1
-        near, budgets = np.empty(end - begin, np.int64), np.empty(end - begin)
+        near = np.empty(end - begin, np.int64)
         for mark in range(begin, end):
             near[mark - begin] = min(int(crossed[marks.link[mark] - a]), count - 2)
-            budgets[mark - begin] = at_vertex[marks.link[mark]]
-        _nearest_together(point, marks.point[begin:end], budgets, near)
         _in_order_places(spans, of, (point, at), near, marks, begin, end, out, passes[begin:end])
         for mark in range(begin, end):
             if marks.first[marks.segment[mark]] == mark:

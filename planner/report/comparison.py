@@ -13,7 +13,7 @@ from rich.text import Text
 
 from planner.base.files import readable
 from planner.base.units import MICROMETRE
-from planner.feedrate.constraints import normal_limit
+from planner.corners.budget import NORMAL
 from planner.machine import Machine
 from planner.report.compare import Row, best_of
 from planner.report.replace import write_whole
@@ -22,7 +22,7 @@ from planner.report.summary import versions
 from planner.report.tables import outcome_text, outcomes_table, titled
 
 SUFFIXES = (".json", ".csv")
-QUANTITIES = ("velocity", "acceleration", "jerk", "feed", normal_limit.NAME)
+QUANTITIES = ("velocity", "acceleration", "jerk", "feed", NORMAL)
 
 
 def comparison_table(rows: list[Row], title: str) -> Group:

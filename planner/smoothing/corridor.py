@@ -60,15 +60,9 @@ def _feed_changes(path: SmoothPath) -> FeedChanges:
 @njit(cache=True, error_model="numpy")
 def run_corridor(whole, q):
     """The corridor of run q."""
-    return part_of(whole, whole.first[q], whole.first[q + 1])
-
-
-@njit(cache=True, error_model="numpy")
-def part_of(whole, a, b):
-    """The vertices a .. b - 1 of a `Corridor`."""
-    _, place, point, turn, along, tol, tol_chord = whole
-    first = whole.first[:0]
-    return Corridor(first, place[a:b], point[a:b], turn[a:b], along[a:b], tol[a:b], tol_chord[a:b])
+    first, place, point, turn, along, tol, tol_chord = whole
+    a, b = first[q], first[q + 1]
+    return Corridor(first[:0], place[a:b], point[a:b], turn[a:b], along[a:b], tol[a:b], tol_chord[a:b])
 
 
 @njit(cache=True, error_model="numpy")

@@ -2,13 +2,9 @@
 
 The control points of the first spline are the places of the corridor's chain at the spline's Greville
 abscissae: a smoothed chain that leaves it only at corners, and the less, the denser the knots are. Where it
-uses more than `ROOM` of the tolerance, knots are added, which moves the knots of the whole run a little: on a
-run of 100,000 corners some site always ends a little beyond `ROOM`. That does no harm: what is within
-`INSIDE` of the tolerance is a start for the relaxation (relax.py). Only spans with sites outside of that are
-no spline, and the run is to be cut there (spline_path.py).
-
-How dense the knots of a long run must be is found in ranges, side by side; with these distances its knots are
-laid as a whole, and made denser only where it uses more than `INSIDE`.
+uses more than `ROOM` of the tolerance, knots are added, `DENSER_MAX` times at most. What is within `INSIDE` of
+it is a start for the relaxation (relax.py). Only spans with sites outside of that are no spline, and the run
+is to be cut there (spline_path.py).
 
 Knots are near to each other where the path turns much within its tolerance. A control polygon that follows
 the path leaves it by about a quarter of the turning between two knots times their distance. So knots stand at
@@ -21,18 +17,13 @@ into chords. They grow by `GROWTH` of the distance from there, and stay below wh
 its acceleration.
 """
 
-from functools import partial
-from itertools import pairwise
-
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
 from planner.base.search import first_not_before
-from planner.base.sizes import SIZES
-from planner.base.threads import side_by_side
-from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at, put, put_rows
-from planner.smoothing.corridor import Corridor, part_of, run_corridor
+from planner.smoothing.basis import DEGREE, ORDER, clamped, knots_at
+from planner.smoothing.corridor import Corridor, run_corridor
 from planner.smoothing.sites import Sites, Splines, sites_of_run, used_share
 
 # Control points on the path leave a corner by 0.28 theta h, so by 0.56 of the tolerance.
@@ -125,7 +116,6 @@ DENSER = 0.75  # factor on the distance of knots where it uses more [-]
 DENSER_MAX = 16  # so many times at most: knots are 100 times as dense then
 INSIDE = 0.99  # of the tolerance that it may use in the end [-]: the relaxation starts strictly inside of its own corridor, relax.USED
 SPANS_MIN = 8  # of a run: with five control points fixed at either end three are left to move
-RANGE = SIZES.laid_range
 
 
 def lay(corridor: Corridor, longest: FloatArray) -> Splines:
@@ -133,18 +123,21 @@ def lay(corridor: Corridor, longest: FloatArray) -> Splines:
 
     longest : (Q,) longest span of each run [mm]
     """
-    distance = np.full(len(corridor.place), np.inf)
-    for q in np.flatnonzero(np.diff(corridor.first) >= 2 * RANGE).tolist():
-        begin, end = int(corridor.first[q]), int(corridor.first[q + 1]) - 1
-        count = (end - begin) // RANGE
-        cuts = [begin + (end - begin) * k // count for k in range(count + 1)]
-
-        def work(a: int, b: int, longest: float) -> None:
-            distance[a + 1 : b] = needed_distances(corridor, longest, a, b)
-
-        tasks = [partial(work, a, b, float(longest[q])) for a, b in pairwise(cuts)]
-        side_by_side(tasks, lambda: None, lambda: None)
-    return Splines(*_lay(corridor, longest, distance))
+    laid = [_lay_run(run_corridor(corridor, q), longest[q]) for q in range(len(longest))]
+    axes = corridor.point.shape[1]
+    none = Sites(
+        np.empty(0, np.int64), *(np.empty((0, *size)) for size in ((), (ORDER,), (axes,), (axes,), (), ()))
+    )
+    sites = [run[2] for run in laid]
+    return Splines(
+        span_first=np.cumsum([0, *(len(run[3]) for run in laid)]),
+        breaks=np.concatenate([np.empty(0), *(run[0] for run in laid)]),
+        control=np.concatenate([np.empty((0, axes)), *(run[1] for run in laid)]),
+        site_first=np.cumsum([0, *(len(one.span) for one in sites)]),
+        sites=Sites(*(np.concatenate(columns) for columns in zip(none, *sites, strict=True))),
+        outside=np.concatenate([np.empty(0, np.bool_), *(run[3] for run in laid)]),
+        fits=np.array([not run[3].any() for run in laid], dtype=np.bool_),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -183,44 +176,18 @@ def _denser(h, inner, sites, breaks, used):
     return graded(inner, h)
 
 
-@njit(cache=True, error_model="numpy")
-def _laid(corridor, inner, h, longest):
-    """Breaks, control points and sites of one run whose knots are at the distances h (m,) at the places
-    `inner` (m,), and what the sites use of the tolerance."""
-    breaks = spread(inner, h, corridor.place[0], corridor.place[-1], longest, SPANS_MIN)
-    control = greville_control(corridor, breaks)
-    sites = sites_of_run(corridor, knots_at(breaks))
-    return breaks, control, sites, used_share(sites, control)
-
-
 @njit(cache=True, error_model="numpy", nogil=True)
-def needed_distances(whole, longest, first, last):
-    """The distances of knots (last - first - 1,) at the vertices between two of one run, with which a spline
-    between them by itself uses no more than `ROOM`."""
-    corridor = part_of(whole, first, last + 1)
+def _lay_run(corridor, longest):
+    """The first spline of one run: breaks, control points, sites, and the spans (S,) with one outside."""
     inner = corridor.place[1:-1]
     h = spacing(inner, corridor.turn[1:-1], corridor.tol[1:-1], longest)
-    for _ in range(DENSER_MAX):
-        breaks, _, sites, used = _laid(corridor, inner, h, longest)
-        if not (used > ROOM).any():
-            break
-        h = _denser(h, inner, sites, breaks, used)
-    return h
-
-
-@njit(cache=True, error_model="numpy")
-def _lay_run(corridor, longest, distance):
-    """The first spline of one run: breaks, control points, sites, and the spans (S,) with one outside.
-    distance : (V,) known ones of knots, infinite where they are not"""
-    inner = corridor.place[1:-1]
-    h = spacing(inner, corridor.turn[1:-1], corridor.tol[1:-1], longest)
-    room = ROOM
-    if (distance < np.inf).any():
-        h, room = graded(inner, np.minimum(h, distance[1:-1])), INSIDE
     attempt = 0
     while True:
-        breaks, control, sites, used = _laid(corridor, inner, h, longest)
-        if attempt == DENSER_MAX or not (used > room).any():
+        breaks = spread(inner, h, corridor.place[0], corridor.place[-1], longest, SPANS_MIN)
+        control = greville_control(corridor, breaks)
+        sites = sites_of_run(corridor, knots_at(breaks))
+        used = used_share(sites, control)
+        if attempt == DENSER_MAX or not (used > ROOM).any():
             break
         attempt += 1
         h = _denser(h, inner, sites, breaks, used)
@@ -229,39 +196,3 @@ def _lay_run(corridor, longest, distance):
         if used[j] > INSIDE:
             outside[sites.span[j]] = True
     return breaks, control, sites, outside
-
-
-@njit(cache=True, error_model="numpy")
-def _lay(corridor, longest, distance):
-    """Columns of `Splines`. distance : (V,) of knots, as of `_lay_run`"""
-    runs, axes = len(longest), corridor.point.shape[1]
-    first = corridor.first
-    parts = [
-        _lay_run(run_corridor(corridor, q), longest[q], distance[first[q] : first[q + 1]])
-        for q in range(runs)
-    ]
-    span_first, site_first = np.zeros(runs + 1, np.int64), np.zeros(runs + 1, np.int64)
-    for q in range(runs):
-        _, _, own, out = parts[q]
-        span_first[q + 1], site_first[q + 1] = span_first[q] + len(out), site_first[q] + len(own.span)
-    S, J = span_first[runs], site_first[runs]
-    breaks, control = np.empty(S + runs), np.empty((S + DEGREE * runs, axes))
-    span, place, slide, radius = np.empty(J, np.int64), np.empty(J), np.empty(J), np.empty(J)
-    weights, target, along = np.empty((J, ORDER)), np.empty((J, axes)), np.empty((J, axes))
-    outside, fits = np.empty(S, np.bool_), np.ones(runs, np.bool_)
-    for q in range(runs):
-        cut, points, own, out = parts[q]
-        s, j = span_first[q], site_first[q]
-        fits[q] = not out.any()
-        put(outside, s, out)
-        put(breaks, s + q, cut)
-        put_rows(control, s + DEGREE * q, points)
-        put(span, j, own.span)
-        put(place, j, own.place)
-        put(slide, j, own.slide)
-        put(radius, j, own.radius)
-        put_rows(weights, j, own.weights)
-        put_rows(target, j, own.target)
-        put_rows(along, j, own.along)
-    sites = Sites(span, place, weights, target, along, slide, radius)
-    return span_first, breaks, control, site_first, sites, outside, fits

@@ -12,12 +12,9 @@ Over control points c (n, A), a quadratic form, a banded matrix H_k per axis, si
 block-banded with blocks of A: linear in n. Steps keep every g_j < 0, so that any iterate is a path inside the
 corridor; where the method ends early, the path is less smooth than it could be and no less inside.
 
-Clarabel solves the same problem as a second-order cone programme (tests/smoothing/test_clarabel.py), but its
-iterates may be outside, and it cannot be called from a compiled kernel.
-
 Row i of a symmetric banded matrix holds the entries of the upper triangle within `width` of the diagonal, the
-diagonal first: band[i, d] is the entry (i, i + d). Inner loops run along whole rows, zeros included, so that
-a compiler makes vector instructions.
+diagonal first: band[i, d] is the entry (i, i + d). Inner loops run along whole rows, zeros included, for vector
+instructions.
 """
 
 from typing import NamedTuple

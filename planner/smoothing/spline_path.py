@@ -13,12 +13,10 @@ from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.smoothing.basis import ORDER, derivatives
 from planner.smoothing.corridor import Corridor, find_corridor
-from planner.smoothing.forms import third_derivative_bands
 from planner.smoothing.initial import lay
-from planner.smoothing.relax import Goal, relax
+from planner.smoothing.relax import REACH, Goal, relax
 from planner.smoothing.runs import SplineRuns, find_runs, longest_span
 from planner.smoothing.sites import Sites, Splines, run_control, run_knots
-from planner.smoothing.windows import REACH
 
 CUSP = 1e-2  # slowest advance of a curve per mm of the programmed path [-] ...
 CUSP_PLACES = 17  # ... looked for at so many places per span: |p_u|^2 is of degree 8, with two places for each of its extremes
@@ -67,7 +65,7 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     splines = lay(corridor, of_run)
     jerk = machine.limits("jerk", axes)
     weights = (jerk.min() / jerk) ** 2
-    goal = Goal(third_derivative_bands(splines, weights), RELATIVE_GAP, weights, REACH)
+    goal = Goal(RELATIVE_GAP, weights, REACH)
     relaxed = relax(corridor, splines, runs, goal)
     splines = splines._replace(control=relaxed.control)
     splines = splines._replace(fits=relaxed.certified & ~cusps(splines))
@@ -82,38 +80,10 @@ def cusps(splines: Splines) -> Array:
     return np.asarray(np.logical_or.reduceat(cusp_spans(splines), splines.span_first[:-1]))
 
 
-def cusp_spans(splines: Splines) -> Array:
+@njit(cache=True, error_model="numpy", nogil=True)
+def cusp_spans(splines):
     """(S,) True for spans on which the curve all but stands still somewhere (`CUSP`), or turns back between
     two places that are looked at: no motion along it has a direction there."""
-    return np.asarray(_cusp_spans(splines))
-
-
-@njit(cache=True, error_model="numpy")
-def turns_little(poly, control, i, h):
-    """Whether a span has no cusp at first sight: its derivative by tau, sum_m m C_m tau^(m-1), is never more
-    than |C_1|/2 away from C_1, and that is more than twice of a cusp's.
-
-    poly    : (6, 6) basis polynomials of span i of length h [mm]
-    control : (n, A) control points of its spline [mm]
-    """
-    first, others = 0.0, 0.0
-    for m in range(1, ORDER):
-        square = 0.0
-        for k in range(control.shape[1]):
-            value = 0.0
-            for b in range(1, ORDER):  # they sum up to 0 for m > 0: from the first control point on
-                value += poly[b, m] * (control[i + b, k] - control[i, k])
-            square += value * value
-        if m == 1:
-            first = np.sqrt(square)
-        else:
-            others += m * np.sqrt(square)
-    return others <= 0.5 * first and first > 2.0 * CUSP * h
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _cusp_spans(splines):
-    """(S,) `cusp_spans`."""
     span_first, axes = splines.span_first, splines.control.shape[1]
     found = np.zeros(span_first[-1], np.bool_)
     rows, tangent, before = np.empty((4, ORDER)), np.empty(axes), np.empty(axes)
@@ -121,8 +91,6 @@ def _cusp_spans(splines):
         cut, basis = run_knots(splines, q)
         control = run_control(splines, q)
         for i in range(len(cut) - 1):
-            if turns_little(basis[i], control, i, cut[i + 1] - cut[i]):
-                continue
             for place in range(CUSP_PLACES):
                 derivatives(basis[i], place / (CUSP_PLACES - 1.0), cut[i + 1] - cut[i], rows)
                 square, forward = 0.0, 0.0

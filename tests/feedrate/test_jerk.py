@@ -11,6 +11,7 @@ from random_problems import in_units, make_problem
 from benchmarks.jobs import problems
 from benchmarks.solvers.jerk_campaign import small_problem
 from benchmarks.solvers.random_paths import random_path
+from benchmarks.solvers.ratios import constraint_ratios
 from planner.base.point_to_point import rest_to_rest_times
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -21,7 +22,7 @@ from planner.feedrate.jerk.window import ScaledWindow
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.slopes import slopes_of
-from planner.feedrate.solution import Status, constraint_ratios
+from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.solvers.random_paths import random_path
-from planner.feedrate.jerk.columns import columns_of
 from planner.feedrate.jerk.layout import (
     BY_P,
     BY_U,
@@ -28,6 +27,7 @@ from planner.feedrate.jerk.layout import (
     Room,
     U,
     X,
+    columns_of,
     put,
     rows_of,
 )

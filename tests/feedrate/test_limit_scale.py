@@ -10,12 +10,13 @@ from oracles import needs_toppra
 from random_problems import random_problem
 
 from benchmarks.solvers.jerk_campaign import small_problem
+from benchmarks.solvers.ratios import constraint_ratios
 from benchmarks.solvers.sequential_convex import SequentialConvex
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.nlp import JerkLimitedNLP
-from planner.feedrate.solution import constraint_ratios, ratios_by_limit
+from planner.feedrate.solution import ratios_by_limit
 from planner.feedrate.toppra_adapter import ToppraSolver
 
 BY = 1.3

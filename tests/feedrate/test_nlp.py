@@ -10,6 +10,7 @@ from whole_plans import dense_motion, smooth_path
 
 from benchmarks.jobs import problems
 from benchmarks.solvers.jerk_campaign import small_problem
+from benchmarks.solvers.ratios import constraint_ratios
 from planner.base.point_to_point import rest_to_rest_times
 from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.constraints.problem import FeedrateProblem
@@ -19,7 +20,7 @@ from planner.feedrate.reachability import Reachability
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.slopes import slopes_of
-from planner.feedrate.solution import Status, active_names, constraint_ratios
+from planner.feedrate.solution import Status, active_names
 from planner.machine import Machine
 from planner.motion.timing import Motion, law_of_solution
 from planner.nc.program import Program

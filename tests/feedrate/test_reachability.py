@@ -14,6 +14,7 @@ from scipy.optimize import linprog
 from whole_plans import solve
 
 from benchmarks.jobs import problems
+from benchmarks.solvers.ratios import constraint_ratios
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import (
@@ -22,7 +23,7 @@ from planner.feedrate.reachability import (
     axis_rows,
     largest_feed_sq,
 )
-from planner.feedrate.solution import FeedrateSolution, constraint_ratios
+from planner.feedrate.solution import FeedrateSolution
 
 JOBS = problems.all_jobs()
 RESOLVED = [seed for seed in range(40) if seed % 2 == 0]  # from rest to rest: always solvable

@@ -12,6 +12,7 @@ from whole_plans import smooth_path
 
 from benchmarks.jobs import problems
 from benchmarks.solvers.random_paths import random_path
+from benchmarks.solvers.ratios import constraint_ratios
 from benchmarks.solvers.sequential_convex import SequentialConvex
 from planner import plan
 from planner.base.arrays import FloatArray
@@ -24,7 +25,7 @@ from planner.feedrate.jerk.solver import JerkLimited
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.slopes import slopes_of
-from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
+from planner.feedrate.solution import FeedrateSolution, Status
 from planner.feedrate.solvers import (
     OWN,
     SECOND_ORDER,

@@ -12,9 +12,10 @@ from random_problems import line, random_problem
 from whole_plans import solve
 
 from benchmarks.jobs import problems
+from benchmarks.solvers.ratios import constraint_ratios
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.solution import FeedrateSolution, Status, constraint_ratios
+from planner.feedrate.solution import FeedrateSolution, Status
 from planner.feedrate.toppra_adapter import ToppraSolver
 from planner.nc.reader import read_program
 

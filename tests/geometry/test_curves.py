@@ -68,7 +68,7 @@ def test_segments_are_the_curve(name: str) -> None:
                 p, rate, bend = (part[0, 0] for part in at(piece, np.array([u])))
                 u = np.clip(u - (p - q) @ rate / (rate @ rate + (p - q) @ bend), 0.0, 1.0)
             assert np.linalg.norm(at(piece, np.array([u]))[0][0, 0] - q) < 1e-12
-    u = np.linspace(curve.breaks[0], curve.breaks[-1], 200_001)
+    u = np.linspace(curve.knots[0], curve.knots[-1], 200_001)
     length = np.linalg.norm(np.diff(curve.at(u), axis=0), axis=1).sum()
     assert found.length.sum() == pytest.approx(length, rel=1e-6)
 

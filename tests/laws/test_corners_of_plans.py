@@ -11,7 +11,7 @@ from quick import slow_but
 import planner
 from benchmarks.jobs import problems
 from planner.delivery import mending
-from planner.feedrate.constraints import chord_error, normal_limit
+from planner.feedrate.constraints.limits import CHORD_ERROR, NORMAL
 from planner.machine import Machine
 from planner.nc.reader import parse_program
 from planner.planning.job import less_tolerance
@@ -140,7 +140,7 @@ def test_without_the_bound_of_normal_acceleration_equation_19_is_broken(monkeypa
     kept = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert kept.verdict.passed, kept.verdict.faults
     assert 0.99 < kept.corners.speed_ratio.max() <= 1 + RATIO_ROUNDING
-    monkeypatch.setattr(normal_limit, "feed_sq_within", lambda kappa, limit: np.full_like(kappa, np.inf))
+    monkeypatch.setattr(type(NORMAL), "on_side", lambda *_: iter(()))
     monkeypatch.setattr(mending, "mended", lambda *of_motion: None)
     free = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not free.verdict.passed
@@ -154,7 +154,7 @@ def test_without_the_bound_of_the_chord_error_equation_18_is_broken(monkeypatch)
     kept = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not any(laws_broken(kept.corners))
     assert kept.corners.budget_ratio.max() > 0.9
-    monkeypatch.setattr(chord_error, "feed_sq_max", lambda kappa, tol, dt: np.full(len(kappa), np.inf))
+    monkeypatch.setattr(type(CHORD_ERROR), "on_side", lambda *_: iter(()))
     repaired = planner.plan(JOBS["pentagon"], machine, method="second-order", corner="bezier")
     assert not any(
         laws_broken(repaired.corners)

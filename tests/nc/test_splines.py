@@ -235,7 +235,7 @@ def test_a_curve_of_its_own_is_an_exact_program() -> None:
     knots = np.array([0, 0, 0, 0, 1, 2, 2.5, 3, 3, 3, 3])
     given = Nurbs(degree=3, points=rng.uniform(-5, 5, (7, 2)), knots=knots, weights=rng.uniform(0.5, 2, 7))
     program = given.exact_program(50.0)
-    cuts = given.breaks
+    cuts = np.unique(knots)
     u = cuts[:-1, None] + np.diff(cuts)[:, None] * np.linspace(0, 1 - 1e-12, len(U))
     np.testing.assert_allclose(curve(program, 0).reshape(-1, 2), given.at(u.ravel()), atol=1e-10)
     with pytest.raises(InputError, match="degree 4"):

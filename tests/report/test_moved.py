@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import planner
+from benchmarks.jobs.nurbs_chords import chord_program
 from planner.geometry.nurbs import Nurbs
 from planner.nc.points import points_file, read_points
 from tests.commands.command_line import run
@@ -45,7 +46,7 @@ PROGRAMS: dict[str, tuple[Callable[[Path], object], set[str]]] = {
     "text": (lambda folder: planner.read_program(text=MILLED), {"program.ngc"}),
     "points": (lambda folder: planner.path([[0, 0], [20, 3], [25, 9]], feed=30.0), {"program.json"}),
     "curve": (lambda folder: CURVE.exact_program(40.0), {"program.json"}),
-    "chords": (lambda folder: CURVE.to_program(0.01, 40.0), {"program.json"}),
+    "chords": (lambda folder: chord_program(CURVE, 0.01, 40.0), {"program.json"}),
 }
 
 

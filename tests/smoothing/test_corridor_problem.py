@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from planner.smoothing.basis import DEGREE, ORDER, knots_at
-from planner.smoothing.forms import add_third_derivatives
 from planner.smoothing.interior_point import Accuracy, Problem, minimise_in_corridor
+from planner.smoothing.relax import add_third_derivatives
 from planner.smoothing.sites import Sites
 
 

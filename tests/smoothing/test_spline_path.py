@@ -23,10 +23,9 @@ from planner.planning.optimal.geometry import splined_with_stops
 from planner.smoothing import initial as lay
 from planner.smoothing import spline_path
 from planner.smoothing.initial import greville_control
-from planner.smoothing.relax import Relaxed, relax
+from planner.smoothing.relax import REACH, WIDER, ControlWindow, Relaxed, relax, tighten_window
 from planner.smoothing.sites import site_distance, used_share, with_radius
 from planner.smoothing.spline_path import cusps, lost_joints, spline_shape, with_spline
-from planner.smoothing.windows import REACH, WIDER, ControlWindow, tighten_window
 
 MACHINE = problems.machine()
 seeds = st.integers(0, 10**6)
@@ -199,8 +198,8 @@ def one_run():
 @pytest.fixture
 def loose_knots(monkeypatch):
     """No knots are added, so that first splines use more of the tolerance than `ROOM`."""
-    for kernel in ("_lay", "_lay_run"):
-        monkeypatch.setattr(lay, kernel, getattr(lay, kernel).py_func)
+    kernel = "_lay_run"
+    monkeypatch.setattr(lay, kernel, getattr(lay, kernel).py_func)
     monkeypatch.setattr(lay, "DENSER_MAX", 0)
     monkeypatch.setattr(lay, "ROOM", 0.3)
 

@@ -48,7 +48,7 @@ from planner.baselines.fir.guide import per
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import BEYOND, Made, SpeedPlan, settled_fastest, slowing
 from planner.corners.fir import overlap_time
-from planner.feedrate.constraints import filter_error, phase_lag
+from planner.feedrate.constraints.curvature_limits import feed_sq_of_filters, feed_sq_of_lag
 from planner.machine import Machine
 
 # Rounds until everything gets slower with the filters at their longest, so that it ends.
@@ -150,12 +150,12 @@ def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray)
 def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
     """(n,) speed [mm/s] at which the error of filters T1, T2 (n,) [s] is `tol` (n,) [mm] at the curvature `kappa` (n,)
     [1/mm] (par. 24); inf if straight."""
-    return np.sqrt(filter_error.feed_sq_max(kappa, tol, (T1, T2)))
+    return np.sqrt(feed_sq_of_filters(kappa, tol, (T1, T2)))
 
 
 def v_ph(kappa: FloatArray, phi: float, T1: FloatArray, T2: FloatArray) -> FloatArray:
     """The same at which the filtered point lags by phi [rad] (par. 26): (n,), with `kappa`, T1, T2 (n,)."""
-    return np.sqrt(phase_lag.feed_sq_max(kappa, phi, (T1, T2)))
+    return np.sqrt(feed_sq_of_lag(kappa, phi, (T1, T2)))
 
 
 def filter_lengths(

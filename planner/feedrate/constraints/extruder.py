@@ -32,22 +32,10 @@ class ExtruderLimit(PathLimit):
         with np.errstate(divide="ignore"):
             self._bounds = limits[:, None] / ratio
 
-    def velocity(self, at: Place) -> FloatArray:
-        """Largest speed (n,) on the blocks of the places [mm/s]."""
-        return self._of(0, at)
-
-    def acceleration(self, at: Place) -> FloatArray:
-        """Largest acceleration along the path (n,) [mm/s2]."""
-        return self._of(1, at)
-
-    def jerk(self, at: Place) -> FloatArray:
-        """Largest jerk along the path (n,) [mm/s3]."""
-        return self._of(2, at)
-
-    def _of(self, which: int, at: Place) -> FloatArray:
-        assert at.block is not None
-        bound: FloatArray = self._bounds[which, at.block]
-        return bound
+    def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        """Largest speed, acceleration and jerk along the path (n,) on the blocks of the places [mm/s, ...]."""
+        velocity, acceleration, jerk = self._bounds[:, at.block]
+        return velocity, acceleration, jerk
 
 
 def with_extruder_limit(

@@ -1,4 +1,4 @@
-"""A limit, as the planner sees it. Every limit is an object in a file of its own, listed in `limits.py`.
+"""A limit, as the planner sees it. Every limit is an object, listed in `limits.py`.
 
 A limit takes part in the feedrate problem (problem.py) in one of three forms, x = feed^2, u, j:
 

@@ -1,6 +1,6 @@
 """All limits of the planner, in the order in which they are asked: of equal caps the first gives its name.
 
-A limit that is to be built in is a file like the ones imported here and a line in `LIMITS`; the judge needs
+A limit that is to be built in is a class like the ones imported here and a line in `LIMITS`; the judge needs
 code of its own for it (verifier/limits.py), and tests/verifier/test_laws_of_limits.py a motion on which the
 two agree. One of a user's own needs none of that: machine/user_limit.py, docs/extending.md.
 
@@ -15,16 +15,15 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.corners.budget import largest_normal
-from planner.feedrate.constraints.axis_acceleration import AxisAcceleration
-from planner.feedrate.constraints.axis_jerk import AxisJerk
-from planner.feedrate.constraints.axis_velocity import AxisVelocity
-from planner.feedrate.constraints.chord_error import ChordError
-from planner.feedrate.constraints.filter_error import FilterError
+from planner.feedrate.constraints.axis_limits import AxisAcceleration, AxisJerk, DrivePower
+from planner.feedrate.constraints.curvature_limits import (
+    ChordError,
+    FilterError,
+    NormalAcceleration,
+    PhaseLag,
+)
 from planner.feedrate.constraints.limit import AxisLimit, Limit, RowLimit
-from planner.feedrate.constraints.normal_limit import NormalAcceleration
-from planner.feedrate.constraints.phase_lag import PhaseLag
-from planner.feedrate.constraints.power import DrivePower
-from planner.feedrate.constraints.programmed_feed import ProgrammedFeed
+from planner.feedrate.constraints.speed_limits import AxisVelocity, ProgrammedFeed
 from planner.feedrate.constraints.tangential import TangentialAcceleration, TangentialJerk, binding
 from planner.machine import Machine
 from planner.machine.user_limit import OwnLimit

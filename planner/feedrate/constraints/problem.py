@@ -15,14 +15,9 @@ between as well. The jerk limits are carried along for solvers of third order; a
 it does not use them.
 
 `limit_scale` is the factor lam by which the motion has to be slower around a point than path and machine ask
-for (planning/optimal/tighten.py). Slower by lam is a speed over lam, an acceleration over lam^2 and a jerk
-over lam^3, so that every row of the point has the limit
+for (planning/optimal/tighten.py): every row of the point has the limit
 
-    feed_sq_max / lam^2,     a_k / lam^2  (times 1 - margin),     j_k / lam^3
-
-and a motion that is slower by lam everywhere uses exactly the shares of them that the motion itself uses of
-the machine's limits. Path and machine stay what they are. (`margin` cannot say it: it is of the accelerations
-alone, and of intervals.)
+    feed_sq_max / lam^2,     a_k / lam^2  (times 1 - margin),     j_k / lam^3.
 """
 
 from __future__ import annotations
@@ -96,14 +91,11 @@ class FeedrateProblem:
         points, axes = np.shape(self.d1)
         freeze(self, "piece", np.int64, (None,))
         freeze(self, "s", np.float64, (points,))
-        for name in ("d1", "d2_left", "d2_right", "d3_left", "d3_right"):
-            freeze(self, name, np.float64, (points, axes))
-        for name in ("velocity", "acceleration", "jerk"):
-            freeze(self, name, np.float64, (axes,))
+        freeze(self, "d1 d2_left d2_right d3_left d3_right", np.float64, (points, axes))
+        freeze(self, "velocity acceleration jerk", np.float64, (axes,))
         if np.ndim(self.limit_scale) == 0:
             object.__setattr__(self, "limit_scale", np.full(points, float(self.limit_scale)))
-        for name in ("feed_sq_max", "margin", "limit_scale"):
-            freeze(self, name, np.float64, (points,))
+        freeze(self, "feed_sq_max margin limit_scale", np.float64, (points,))
         freeze(self, "feed_sq_bound", np.int64, (points,))
         if self.own:
             freeze(self, "own_here", np.float64, (2, points, self.own))

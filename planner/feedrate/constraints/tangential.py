@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.feedrate.constraints.axis_acceleration import AxisAcceleration
-from planner.feedrate.constraints.axis_jerk import AxisJerk
+from planner.feedrate.constraints.axis_limits import AxisAcceleration, AxisJerk
 from planner.feedrate.constraints.limit import Limit
 from planner.machine import LINEAR_AXES, TANGENTIAL, Machine
 from planner.machine.user_limit import PathLimit, Place
@@ -48,13 +47,9 @@ class _Row(PathLimit):
         both = (AxisAcceleration.name, largest), (AxisJerk.name, fastest)
         self.bounded = tuple(name for name, bound in both if np.isfinite(bound))
 
-    def acceleration(self, at: Place) -> Any:
-        """The same everywhere [mm/s2]."""
-        return self.largest
-
-    def jerk(self, at: Place) -> Any:
-        """The same everywhere [mm/s3]."""
-        return self.fastest
+    def bounds(self, at: Place) -> tuple[Any, Any, Any]:
+        """The same everywhere [mm/s2], [mm/s3]."""
+        return np.inf, self.largest, self.fastest
 
 
 class TangentialAcceleration(Limit):

@@ -17,6 +17,8 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.sampling.path_samples import PathSamples
 from planner.feedrate.sampling.user_rows import user_rows
 
+DERIVATIVES = ("d1", "d2_left", "d2_right", "d3_left", "d3_right")
+
 
 def with_user_limits(problem: FeedrateProblem, samples: PathSamples, limits: Limits) -> FeedrateProblem:
     """The problem with the limits `along` as further axes; the margin says what is found between the points.
@@ -24,34 +26,26 @@ def with_user_limits(problem: FeedrateProblem, samples: PathSamples, limits: Lim
     Raises NotSolvedError where a limit changes faster than the grid follows, InputError for a bound that is
     not positive and for a joint without derivatives.
     """
-    rows = user_rows(samples, limits)
+    rows, own = user_rows(samples, limits), tuple(limit.name for limit in limits.along)
     if rows.margin.max() >= 1.0:
         line = int(samples.path.toolpath.line[samples.segment[int(rows.margin.argmax())]])
-        all_names = ", ".join(rows.names)
         raise NotSolvedError(
-            f"one of the limits {all_names} changes faster at line {line} than a grid of the finest step follows"
+            f"one of the limits {', '.join(own)} changes faster at line {line} than a grid of the finest step follows"
         )
     fastest = np.abs(rows.d1).max(axis=0)
     unit = np.divide(1.0, fastest, out=np.ones(len(fastest)), where=fastest > 0.0)
     caps, names = problem.feed_sq_max.copy(), list(problem.bound_names)
     which = problem.feed_sq_bound.copy()
-    for k, name in enumerate(rows.names):
+    for k, name in enumerate(own):
         tighter = rows.feed_sq_max[:, k] < caps
         caps[tighter], which[tighter] = rows.feed_sq_max[tighter, k], len(names)
         names.append(VELOCITY.called(name))
     least = [getattr(rows, q).min(axis=0) for q in ("acceleration", "jerk")]
 
-    def columns(name: str) -> FloatArray:
-        return np.hstack([getattr(problem, name), unit * getattr(rows, name)])
-
     return replace(
         problem,
-        axes=problem.axes + rows.names,
-        d1=columns("d1"),
-        d2_left=columns("d2_left"),
-        d2_right=columns("d2_right"),
-        d3_left=columns("d3_left"),
-        d3_right=columns("d3_right"),
+        axes=problem.axes + own,
+        **{name: np.hstack([getattr(problem, name), unit * getattr(rows, name)]) for name in DERIVATIVES},
         velocity=np.append(problem.velocity, np.minimum(unit * rows.least[0], np.finfo(float).max)),
         acceleration=np.append(problem.acceleration, unit * least[0]),
         jerk=np.append(problem.jerk, unit * least[1]),
@@ -59,7 +53,7 @@ def with_user_limits(problem: FeedrateProblem, samples: PathSamples, limits: Lim
         feed_sq_bound=which,
         bound_names=tuple(names),
         margin=np.maximum(problem.margin, rows.margin),
-        own=len(rows.names),
+        own=len(own),
         own_here=np.stack([rows.acceleration / least[0], rows.jerk / least[1]]),
         own_least=rows.least,
     )

@@ -9,12 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.feedrate.jerk.columns import ProblemColumns
-from planner.feedrate.jerk.layout import Room
+from planner.feedrate.jerk.layout import ProblemColumns, Room
 from planner.feedrate.jerk.settings import WindowSettings
-from planner.feedrate.jerk.slowing import slower_by
 from planner.feedrate.jerk.start import envelope
-from planner.feedrate.jerk.window import ScaledWindow, Way, Window
+from planner.feedrate.jerk.window import ScaledWindow, Way, Window, slower_by
 
 # Joining windows. How far a window's stop must be from what is kept, in braking distances [-].
 BRAKING_WAYS = 3.0
@@ -206,11 +204,8 @@ class Chain:
         self.rest = found.after(end - begin)
 
 
-def way_to_brake(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
-    """(n,) distances to come to rest from feeds^2 x (n,) at no acceleration, about."""
-    return x / (2.0 * acceleration) + np.sqrt(x) * acceleration / (2.0 * jerk)
-
-
 def way_felt(x: FloatArray, acceleration: float, jerk: float) -> FloatArray:
-    """(n,) the same, x (n,), and much of the way a^3/j^2 on which a motion builds up acceleration."""
-    return way_to_brake(x, acceleration, jerk) + BUILDING * acceleration**3 / jerk**2
+    """(n,) distances to come to rest from feeds^2 x (n,) at no acceleration, about, and much of the way a^3/j^2 on
+    which a motion builds up acceleration."""
+    brake = x / (2.0 * acceleration) + np.sqrt(x) * acceleration / (2.0 * jerk)
+    return brake + BUILDING * acceleration**3 / jerk**2

@@ -6,20 +6,13 @@ Minimise the time subject to all second-order limits of `FeedrateProblem` and to
 
 with constant jerk j along the path on every interval, the same transcription as nlp.py, so that both can be
 compared on one grid. One window's problem is in window.py, its second-order model in rows.py, the step in
-interior_point.py. One iteration models the Lagrangian at the current profile, minimises the barrier problem's
-linear-quadratic model exactly and goes as far as slacks, multipliers and kinematics stay in their domains. 15
-to 25 iterations, whatever the size.
+interior_point.py: 15 to 25 iterations, whatever the size.
 
 **Windows.** A long piece is solved in windows of about `window` intervals, or more if the braking distance is
-long beside that. Each window ends in a full stop, which is only there to end it. The part of the window that
-the stop cannot influence is kept, up to three braking distances before it, and the next window starts from
-the state reached there, at a point where the costate of the kinematics says that more speed would help
-(chain.py). A start during hard braking into a bend would leave a problem with hardly any feasible points, and
-multipliers that mean nothing. What is kept agrees with the solution in one piece (tested). The memory is that
-of one window per thread.
-
-**Threads.** Pieces between full stops are independent, and solved side by side (planner/base/threads.py); the
-solution is the same, byte by byte, on any number of cores.
+long beside that. Each ends in a full stop, which is only there to end it; what that cannot influence is kept,
+and the next window starts from the state reached there (chain.py). What is kept agrees with the solution in
+one piece (tested). Pieces between full stops are solved side by side; the solution is the same, byte by byte,
+on any number of cores.
 
 **Fall-backs.** A window is tried from three starts (window.py). One that converges from none is divided into
 smaller ones if it starts at rest; else, or where even that fails, the profile stops: at the end of the window
@@ -27,10 +20,9 @@ before, if the motion comes from there, or after the plain start, which always k
 solution's status is then ACCEPTABLE, and its sentence names the places. Of 16,390 windows of small problems
 (benchmarks/solvers/jerk_campaign.py) 19 converged from the plain start only, and 7 from none.
 
-**Feasibility.** At the end a profile may exceed its limits by the solver's tolerance. Slowing a whole piece
-down by lam >= 1 divides speeds by lam, accelerations by lam^2 and jerks by lam^3 and keeps the kinematics
-exact; with the smallest lam that satisfies every row the profile is feasible, always. Its cost, lam - 1, is
-in the sentence of the solution.
+**Feasibility.** At the end a profile may exceed its limits by the solver's tolerance. It is slowed down as a
+whole by the smallest lam >= 1 with which every row holds: speeds by lam, accelerations by lam^2, jerks by
+lam^3, which keeps the kinematics exact. Its cost, lam - 1, is in the sentence of the solution.
 """
 
 from __future__ import annotations
@@ -48,8 +40,7 @@ from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.jerk.chain import INTERVALS_MIN, Chain
-from planner.feedrate.jerk.columns import columns_of, with_rows
-from planner.feedrate.jerk.layout import Room
+from planner.feedrate.jerk.layout import Room, columns_of, with_rows
 from planner.feedrate.jerk.settings import WindowSettings
 from planner.feedrate.jerk.window import Window
 from planner.feedrate.solution import FeedrateSolution, Multipliers, Status

@@ -1,6 +1,6 @@
 """Profiles to start the jerk-limited solver from.
 
-`envelope` is what the solver starts from, turned into a motion where that is found (track.py):
+`envelope` is what the solver starts from, turned into a motion where that is found (window.py):
 
 1. Caps: feed^2 may not exceed a share of what axis accelerations and jerks allow at constant speed,
    |r''_k| x <= a_k and |r'''_k| x^(3/2) <= j_k.

@@ -15,29 +15,35 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.kernels import njit
-from planner.feedrate.jerk import interior_point as kernel
-from planner.feedrate.jerk.columns import ProblemColumns
+from planner.feedrate.jerk.interior_point import SOLVED, minimise_time, within_domain
 from planner.feedrate.jerk.layout import (
+    CONVEX,
+    COSTATE,
     DS,
+    GRADIENT,
     LAM_LOW,
     LAM_UP,
     LANES,
     PI,
     ROW,
+    STEP,
+    STEP_END,
     X_END,
     Blocks,
+    H,
     P,
+    ProblemColumns,
     Room,
+    U,
     X,
     profile,
     put,
     rows_of,
 )
-from planner.feedrate.jerk.rows import duration
+from planner.feedrate.jerk.riccati import forward, offsets, riccati
+from planner.feedrate.jerk.rows import PASSING, duration, kinematics
 from planner.feedrate.jerk.settings import SETTINGS, InteriorPointSettings
-from planner.feedrate.jerk.slowing import jerk_of, slower_by
 from planner.feedrate.jerk.start import envelope, envelope_profile, plain_start
-from planner.feedrate.jerk.track import track
 
 # A start keeps every limit times this [-]: without room its slacks block the first steps ...
 START_ROOM = 0.9
@@ -134,9 +140,9 @@ class ScaledWindow:
         most = starts = 0
         for starts, (x, u) in enumerate(self._starts(behind), start=1):
             put(self.blocks, x, u)
-            found = kernel.minimise_time(self.blocks, tol, iterations, self.settings)
+            found = minimise_time(self.blocks, tol, iterations, self.settings)
             most = max(most, found.iterations)
-            if found.status == kernel.SOLVED:
+            if found.status == SOLVED:
                 self._track(0.0, POLISHING_ROUNDS, POLISHED)
                 return self._window(), most, starts
         return None, most, starts
@@ -244,3 +250,82 @@ def _found(blocks):
         if 0 < i < n - 1:  # these limit the kinematics, not the feed
             feed[i, 1] = row[(count - 1) * ROW + LAM_UP + o]
     return jerk, times, rows, feed, dynamics
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def slower_by(columns, begin, x, u, jerk, room):
+    """The smallest factor >= 1 by which a profile over points from `begin` on has to be slower to keep every
+    limit times `room` at the points, the feed, and both ends of the intervals, acceleration and jerk.
+
+    x, u : (N+1,)
+    jerk : (N,)
+    """
+    n, axes = len(x) - 1, columns.d1.shape[1]
+    second, third = room, room
+    for i in range(n + 1):
+        a, v = begin + i, np.sqrt(x[i])
+        second = max(second, x[i] / columns.x_max[a])
+        for k in range(axes):
+            d1, per_a, per_j = columns.d1[a, k], 1.0 / columns.acceleration[a, k], 1.0 / columns.jerk[a, k]
+            if i > 0:
+                d2, d3 = columns.d2_left[a, k], columns.d3_left[a, k]
+                second = max(second, abs(d1 * u[i] + d2 * x[i]) * per_a)
+                third = max(third, abs(d1 * jerk[i - 1] + v * (3.0 * d2 * u[i] + d3 * x[i])) * per_j)
+            if i < n:
+                d2, d3 = columns.d2_right[a, k], columns.d3_right[a, k]
+                second = max(second, abs(d1 * u[i] + d2 * x[i]) * per_a)
+                third = max(third, abs(d1 * jerk[i] + v * (3.0 * d2 * u[i] + d3 * x[i])) * per_j)
+    return max(np.sqrt(second / room), np.cbrt(third / room))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def jerk_of(s, x, u):
+    """(N,) jerk of a profile x, u (N+1,) over the points s."""
+    n = len(x) - 1
+    jerk = np.empty(n)
+    for i in range(n):
+        p = u[i + 1] - u[i]
+        jerk[i] = p / duration(np.sqrt(x[i]), np.sqrt(x[i + 1]), p, s[i + 1] - s[i])
+    return jerk
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def track(blocks, jerk, smoothing, rounds, defect_max, settings):
+    """A motion on exact kinematics, not far from the x of the profile in `blocks`, in its place: Gauss-Newton
+    on the time integral of (dx/x)^2 J + j^2/J, with the jerk j of the result and a jerk J of the machine's
+    size; without smoothing, j is the change of the jerk. Both ends stay.
+
+    rounds     : at most
+    defect_max : that it ends with, if it gets there
+
+    Returns the defect that is left.
+    """
+    n, work = blocks.n, blocks.work
+    passing = np.empty(PASSING)
+    asked = work[:, X : X + LANES].copy()
+    work[:, CONVEX:COSTATE] = 0.0
+    worst, defect = np.inf, np.empty(LANES)
+    for _ in range(rounds):
+        defect[:] = 0.0
+        for b in range(len(work)):
+            w, m = work[b], min(LANES, n - b * LANES)
+            kinematics(blocks.grid[b], w, passing, defect, m)
+            for i in range(m):
+                span = w[H + i] * jerk
+                weight = span / (asked[b, i] * asked[b, i]) if b + i > 0 else 0.0
+                w[CONVEX + i], w[CONVEX + 5 * LANES + i] = weight, 1.0 / span
+                w[GRADIENT + i], w[GRADIENT + LANES + i] = weight * (w[X + i] - asked[b, i]), 0.0
+                w[GRADIENT + 2 * LANES + i] = smoothing * w[P + i] / span
+        worst = defect.max()
+        if worst <= defect_max or not riccati(blocks, 0.0):
+            break
+        offsets(blocks, 0.0)
+        primal = within_domain(blocks, forward(blocks, settings.feed_sq_shrink), settings)
+        for b in range(len(work)):
+            w = work[b]
+            for i in range(min(LANES, n - b * LANES)):
+                w[X + i] += primal * w[STEP + i]
+                w[X_END + i] += primal * w[STEP_END + i]
+                w[U + i] += primal * w[STEP + LANES + i]
+                w[P + i] += primal * w[STEP + 2 * LANES + i]
+    return worst

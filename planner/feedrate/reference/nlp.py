@@ -15,31 +15,25 @@ trick:
 
 The row v + a h/2 keeps the feed within its bounds between the points as well: v(t) is a parabola whose Bezier
 ordinates are v_i, v_i + a_i h_i/2 and v_{i+1}. Without it, coarse grids overshoot the programmed feed where
-the acceleration ends (0.2 % of the time of a line of 100 mm). It costs nothing where a ramp of constant jerk
-ends in a constant feed: there all ordinates are on the bound.
+the acceleration ends (0.2 % of the time of a line of 100 mm).
 
 So that all rows of a point depend on that point alone, as fatrop's stages ask for, the jerk of the interval
-to its left is a state
-of the point as well. A stage is the state (v, a, j_left), the control (j, h), and the gap  state_{i+1} - f(state_i, control_i) = 0;
-fatrop's interface wants exactly this sign and order (gap rows of a stage, then its other rows), ipopt does
-not mind.
+to its left is a state of the point as well. A stage is the state (v, a, j_left), the control (j, h), and the
+gap state_{i+1} - f(state_i, control_i) = 0; fatrop wants exactly this sign and order.
 
-Not convex, and no certificate of a global optimum; from many starting points both solvers end in the same
-optimum. Every row is scaled by its limit and every piece has its own units (mean interval 1, mean guessed
-duration 1), so that the iterates do not depend on the unit of length or time.
+Not convex; from many starting points both solvers end in the same optimum. Every row is scaled by its limit
+and every piece has its own units (mean interval 1, mean guessed duration 1), so that the iterates do not
+depend on the unit of length or time.
 
-The multipliers are told in the coordinates of the own kernel (feedrate/jerk/rows.py), so that prices and
-sensitivities need not know who solved the problem. Rows of axis limits are the same there; a
-bound on v is one on x = v^2, with half of its multiplier when both count relative changes. The kernel's only
-equation is x_{i+1} = x_i + (2 a + p)(ds + p h^2/12) + e with p = j h; an error e in it shifts v_{i+1} by e/(2
+The multipliers are told in the coordinates of the own kernel (feedrate/jerk/rows.py). Rows of axis limits are
+the same there; a bound on v is one on x = v^2, with half of its multiplier when both count relative changes.
+The kernel's only equation is x_{i+1} = x_i + (2 a + p)(ds + p h^2/12) + e with p = j h; an error e in it shifts v_{i+1} by e/(2
 vm), vm = (v_i + v_{i+1})/2, and the length of the interval by h e/(4 vm), so that with the multipliers nu_v
 of v's gap and nu_s of the row of ds_i
 
     pi = dT/de = (nu_s h/(2 ds) - nu_v) / (2 vm).
 
-Costs 1-5 ms per grid point with ipopt; fatrop's iterations take half as long, but building its interface
-grows with the square of the points and costs more than it saves above a few hundred (docs/methods.md has the
-numbers). References: Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ipopt); Vanroye et al. 2023,
+What both cost: docs/methods.md. References: Waechter & Biegler 2006, doi 10.1007/s10107-004-0559-y (ipopt); Vanroye et al. 2023,
 arXiv 2303.16746 (fatrop).
 """
 
@@ -54,10 +48,10 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import import_needed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
-from planner.feedrate.reference.exact_motion import polished
 from planner.feedrate.reference.piecewise import (
     INTERVALS_MIN,
     Found,
+    polished,
     solution_of,
     solve_pieces,
     too_few,

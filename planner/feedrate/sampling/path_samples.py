@@ -42,12 +42,9 @@ class PathSamples:
         points, axes = np.shape(self.position)
         freeze(self, "piece", np.int64, (None,))
         freeze(self, "stop", np.int64, (len(self.piece),))
-        for name in ("s", "w0", "w1", "margin", "kappa_left", "kappa_right"):
-            freeze(self, name, np.float64, (points,))
-        for name in ("position", "d1", "d2_left", "d2_right", "d3_left", "d3_right"):
-            freeze(self, name, np.float64, (points, axes))
-        for name in ("element", "segment"):
-            freeze(self, name, np.int64, (points,))
+        freeze(self, "s w0 w1 margin kappa_left kappa_right", np.float64, (points,))
+        freeze(self, "position d1 d2_left d2_right d3_left d3_right", np.float64, (points, axes))
+        freeze(self, "element segment", np.int64, (points,))
 
     def __len__(self) -> int:
         return len(self.s)

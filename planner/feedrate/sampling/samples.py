@@ -26,7 +26,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
-from planner.corners.elements import element_table
+from planner.corners.elements import ElementTable, element_table
 from planner.corners.smooth import SmoothPath
 from planner.feedrate.constraints.limits import Limits
 from planner.feedrate.sampling.feed_limited import FeedLimited, feed_limited, quiet_way
@@ -86,8 +86,23 @@ def sample_path(
     rows = divide(table, rows, limits, resolution, shortest)
     if third_order:
         rows = grade(table.legs, rows)
+    samples = _samples_of(path, table, rows, limits)
+    if of_machine.along:
+        for _ in range(HALVINGS_OF_OWN):
+            coarse = np.flatnonzero(user_rows(samples, of_machine, resolution).coarse)
+            if not len(coarse):
+                break
+            rows = np.insert(rows, coarse + 1, rows[coarse])
+            behind = coarse + np.arange(1, len(coarse) + 1)
+            rows["w1"][behind - 1] = rows["w0"][behind] = 0.5 * (rows["w0"][behind] + rows["w1"][behind])
+            samples = _samples_of(path, table, rows, limits)
+    return samples
+
+
+def _samples_of(path: SmoothPath, table: ElementTable, rows: Array, limits: PathLimits) -> PathSamples:
+    """The path on the grid of the rows (P,) of feedrate/sampling/rows.py."""
     grid = Intervals(*(rows[name].copy() for name in ("curve", "w0", "w1", "segment", "last")))
-    samples = PathSamples(
+    return PathSamples(
         path=path,
         table=table,
         piece=np.concatenate([[0], np.flatnonzero(grid.last) + 1]),
@@ -97,42 +112,6 @@ def sample_path(
         w1=grid.w1,
         segment=grid.segment,
         **evaluate(table, grid, limits)._asdict(),
-    )
-    if of_machine.along:
-        for _ in range(HALVINGS_OF_OWN):
-            coarse = user_rows(samples, of_machine, resolution).coarse
-            if not coarse.any():
-                break
-            samples = _halved(samples, np.flatnonzero(coarse), limits)
-    return samples
-
-
-def _halved(samples: PathSamples, interval: Array, limits: PathLimits) -> PathSamples:
-    """The grid with the intervals (n,) halved in their parameter; the limits matter to the margin."""
-    after = interval + 1
-    middle = 0.5 * (samples.w0[interval] + samples.w1[interval])
-
-    def put(values: Array, new: Array) -> Array:
-        return np.insert(values, after, new, axis=0)
-
-    w1 = samples.w1.copy()
-    w1[interval] = middle
-    w0, w1 = put(samples.w0, middle), put(w1, samples.w1[interval])
-    element, segment = (put(column, column[interval]) for column in (samples.element, samples.segment))
-    piece = samples.piece + np.searchsorted(interval, samples.piece, side="left")
-    last = np.zeros(len(w0), dtype=bool)
-    last[piece[1:] - 1] = True
-    grid = Intervals(element, w0, w1, segment, last)
-    return replace(
-        samples,
-        path=samples.path,
-        table=samples.table,
-        piece=piece,
-        element=element,
-        w0=w0,
-        w1=w1,
-        segment=segment,
-        **evaluate(samples.table, grid, limits)._asdict(),
     )
 
 

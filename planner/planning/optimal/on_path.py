@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.corners.budget import NORMAL
 from planner.corners.smooth import SmoothPath
-from planner.feedrate.constraints import normal_limit
 from planner.feedrate.constraints.limits import FILTER_ERROR
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.sampling.samples import PathSamples
@@ -37,9 +37,7 @@ class OnPath:
     def held_by_filters(self) -> OnPath:
         """The same, its normal acceleration named after the filters, for which alone it is limited."""
         problem = self.problem
-        names = tuple(
-            FILTER_ERROR.name if name == normal_limit.NAME else name for name in problem.bound_names
-        )
+        names = tuple(FILTER_ERROR.name if name == NORMAL else name for name in problem.bound_names)
         first = np.array([names.index(name) for name in names])
         problem = dataclasses.replace(problem, bound_names=names, feed_sq_bound=first[problem.feed_sq_bound])
         return dataclasses.replace(self, problem=problem)

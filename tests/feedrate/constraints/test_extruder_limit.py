@@ -30,6 +30,6 @@ def test_speed_acceleration_and_jerk_are_those_at_which_the_filament_is_at_its_o
     limits, ratio = np.array([5.0, 300.0, 9e3]), np.array([0.05, 0.0, 0.2])
     at = Place(AXES, np.zeros((3, 4)), np.zeros((4, 3)), np.array([0, 1, 2, 0]))
     limit = ExtruderLimit(limits, ratio)
-    found = limit.velocity(at), limit.acceleration(at), limit.jerk(at)
+    found = limit.bounds(at)
     for bound, of_extruder in zip(found, limits, strict=True):
         np.testing.assert_allclose(bound, of_extruder * np.array([20.0, np.inf, 5.0, 20.0]))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import planner
+from benchmarks.solvers.ratios import constraint_ratios
 from planner import JointLimit, PathLimit
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -13,7 +14,6 @@ from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.grid import SWITCH_MIN, refine_for_jerk
 from planner.feedrate.reference.nlp import JerkLimitedNLP
 from planner.feedrate.sampling.samples import sample_path
-from planner.feedrate.solution import constraint_ratios
 from planner.feedrate.solvers import OWN, REACHABILITY, SECOND_ORDER, THIRD_ORDER
 from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine

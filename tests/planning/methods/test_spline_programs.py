@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from curves import curve_named
 
+from benchmarks.jobs.nurbs_chords import chord_program
 from planner.machine import Machine, load_machine, machine_from_dict
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
@@ -122,7 +123,7 @@ def test_a_spline_is_as_fast_as_its_fine_chords_or_faster() -> None:
     curve = curve_named("trident")
     how = {"method": "second-order", "effort": "quick", "tolerance": 0.01}
     exact = time_of(plan(curve.exact_program(50.0), ROUTER, **how))
-    chords = time_of(plan(curve.to_program(1e-3, 50.0), ROUTER, **how))
+    chords = time_of(plan(chord_program(curve, 1e-3, 50.0), ROUTER, **how))
     assert exact < 1.01 * chords
     assert chords < 1.05 * exact
 

@@ -2,8 +2,7 @@
 [input_shaper] with the modes of the frame.
 
 Klipper limits velocity and acceleration along the path, a machine file those of each axis: an axis may use
-them alone. What it does at corners is in the table [control] of the machine file, for predictions of its
-times (controls/timing/models.py).
+them alone. What it does at corners goes to the table [control], for predictions (controls/timing/models.py).
 """
 
 import re
@@ -27,14 +26,14 @@ def recognised(text: str) -> bool:
 
 def settings(text: str, source: str) -> ControlSettings:
     """The settings of a printer.cfg. Raises InputError for kinematics without limits of their own for x, y
-    and z, and for numbers that cannot be read."""
+    and z."""
     config = read_klipper_config(text, source)
     kinematics = config.text("printer", "kinematics")
     if kinematics is not None and kinematics not in _PER_AXIS:
-        raise InputError(
-            f"[printer] kinematics is {kinematics}; limits of x, y and z are known for {', '.join(_PER_AXIS)}",
-            source=source,
+        said = (
+            f"[printer] kinematics is {kinematics}; limits of x, y and z are known for {', '.join(_PER_AXIS)}"
         )
+        raise InputError(said, source=source)
     limits = {}
     for key in ("velocity", "accel"):
         path, z = (config.positive("printer", f"max_{which}{key}") for which in ("", "z_"))
@@ -47,6 +46,10 @@ def settings(text: str, source: str) -> ControlSettings:
         if frequency := config.positive("input_shaper", f"shaper_freq_{letter}"):
             found = FoundMode(frequency.value, damping.value if damping else _DAMPING, frequency.place)
             modes.setdefault(frequency.value, found)
+    cruise = config.number("printer", "minimum_cruise_ratio")
+    older = config.positive("printer", "max_accel_to_decel")  # what is left for what is gained and lost
+    if cruise is None and older is not None and along is not None:
+        cruise = Sourced(1.0 - min(1.0, older.value / along.value), older.place)
     return ControlSettings(
         control="Klipper",
         velocity=limits["velocity"],
@@ -55,23 +58,13 @@ def settings(text: str, source: str) -> ControlSettings:
         law={
             "acceleration": along,
             "square_corner_velocity": config.number("printer", "square_corner_velocity") or _CORNER_SPEED,
-            "minimum_cruise_ratio": _cruise_ratio(config, along),
+            "minimum_cruise_ratio": cruise or _CRUISE_RATIO,
         },
         travel=_travel(config),
         macros=_macros(config),
         modes=tuple(modes.values()),
         notes=(*config.notes, *_notes(config)),
     )
-
-
-def _cruise_ratio(config: Settings, acceleration: Sourced | None) -> Sourced:
-    """The minimum cruise ratio; of older files max_accel_to_decel, the acceleration that is left for what is
-    gained and lost."""
-    found = config.number("printer", "minimum_cruise_ratio")
-    older = config.positive("printer", "max_accel_to_decel")
-    if found is None and older is not None and acceleration is not None:
-        return Sourced(1.0 - min(1.0, older.value / acceleration.value), older.place)
-    return found or _CRUISE_RATIO
 
 
 def _notes(config: Settings) -> list[str]:

@@ -32,7 +32,7 @@ from planner.controls.machine_import.settings import (
     Sourced,
     leading_number,
     least,
-)  # fmt: skip
+)
 from planner.machine import ROTARY_AXES
 from planner.machine.parts import AXIS_LIMIT_MAX, XYZAC, XYZBC
 
@@ -77,8 +77,7 @@ def recognised(text: str) -> bool:
 
 def settings(text: str, source: str) -> ControlSettings:
     """The settings of an INI file. Raises InputError for units and numbers that cannot be read."""
-    ini = read_linuxcnc_ini(text, source)
-    return _Found(ini, source).settings()
+    return _Found(read_linuxcnc_ini(text, source), source).settings()
 
 
 class _Found:
@@ -146,10 +145,8 @@ class _Found:
             if found := least(*map(_possible, (own, *joints, path))):
                 limits[letter] = found
         if by_default:
-            self.notes.append(
-                f"{key} of {', '.join(by_default)} is not set; LinuxCNC's default is {default:g} unit a second"
-                + (" squared" if "ACC" in key else "")
-            )
+            said = f"{key} of {', '.join(by_default)} is not set; LinuxCNC's default is {default:g} unit a second"
+            self.notes.append(said + " squared" * ("ACC" in key))
         return limits
 
     def _startup(self) -> tuple[Sourced | None, str | None, bool]:
@@ -168,10 +165,7 @@ class _Found:
 
     def _kinematics(self) -> dict[str, Sourced | str]:
         """The table [kinematics], empty for other modules than tilting rotary tables; notes on what it does
-        not say.
-
-        Raises InputError for a distance that is no number.
-        """
+        not say. Raises InputError for a distance that is no number."""
         module = self.module
         if jointless := [letter for letter in self.letters if self.joints and letter not in self.joints]:
             named = ", ".join(jointless)
@@ -179,22 +173,21 @@ class _Found:
         if module == "trivkins":
             return {}
         if module not in _TYPES:
-            said = f"[KINS] KINEMATICS is {module}: limits are those of the axes, joints move otherwise"
-            self.notes.append(said)
+            self.notes.append(
+                f"[KINS] KINEMATICS is {module}: limits are those of the axes, joints move otherwise"
+            )
             return {}
         kind, pins = _TYPES[module], self._pins()
         found: dict[str, Sourced | str] = {"type": kind}
         for name in _DISTANCES[kind]:
             place = f"{module}.{name}"
-            pin = pins.number("", place, self.unit) or Sourced(0.0, place)
-            found[name.replace("-", "_")] = pin
+            found[name.replace("-", "_")] = pins.number("", place, self.unit) or Sourced(0.0, place)
         turned = f"{module}.conventional-directions"
         if (pins.text("", turned) or "0").lower() not in ("0", "false"):
             self.notes.append(f"{turned} is set: write the axes that turn left-handed here under `reversed`")
         if "identityfirst" not in (self.ini.text("KINS", "KINEMATICS") or ""):
-            self.notes.append(
-                f"{module} begins with the tool centre point on; here a program switches it on by M428 or G43.4"
-            )
+            said = f"{module} begins with the tool centre point on; here a program switches it on by M428 or G43.4"
+            self.notes.append(said)
         return found
 
     def _pins(self) -> Settings:

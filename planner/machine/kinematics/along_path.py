@@ -1,5 +1,5 @@
-"""The joints along a path of the tip, with their first three derivatives, and the tip along one of the
-joints.
+"""The joints along a path of the tip, and the tip along one of the joints, with their first three
+derivatives.
 
 A path gives position and derivatives of all its axes, p(s) and the angles; q(s) = f(p(s)) then has the
 derivatives that the chain rule gives to third order (base/series.py), exact but for rounding.

@@ -52,8 +52,7 @@ def load_machine(path: str | Path) -> Machine:
 
 
 def machine_from_dict(data: dict[str, Any], *, source: str | None = None) -> Machine:
-    """A machine from nested dictionaries with the keys of a machine file. Raises InputError for all faults at
-    once."""
+    """A machine from dictionaries with the keys of its file. Raises InputError for all faults at once."""
     try:
         return Machine(**data)
     except InputError as fault:

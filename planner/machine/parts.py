@@ -1,5 +1,4 @@
-"""Records of the tables of a machine file, in mm, s and, for rotary axes, degrees. They do not change once
-they are made."""
+"""Records of the tables of a machine file, in mm, s and, for rotary axes, degrees."""
 
 from __future__ import annotations
 
@@ -54,8 +53,7 @@ AxisLimit = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_u
 
 
 class Record(BaseModel):
-    """Frozen, without other keys than its own. To set one raises AttributeError, which says how to make
-    another."""
+    """Frozen, without other keys than its own. To set one raises AttributeError."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 

@@ -85,9 +85,7 @@ class PathLimit:
     name: str = ""
     unit: str = "mm"
     turn: float | None = None
-    counts: ClassVar[tuple[str, ...] | None] = (
-        None  # letters of the axes whose common way it is; None: of all
-    )
+    counts: ClassVar[tuple[str, ...] | None] = None  # the axes whose common way it is; None: all
 
     def velocity(self, at: Place) -> Any:
         """Largest speed [mm/s] at the places (n,)."""
@@ -111,8 +109,7 @@ class PathLimit:
 
 
 class JointLimit(ABC):
-    """Bounds on velocity, acceleration and jerk of a function of the position; inf for those that are not
-    bounded."""
+    """Bounds on velocity, acceleration and jerk of a function of the position; inf for none."""
 
     name: str = ""
     unit: str = "mm"
@@ -173,8 +170,7 @@ def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
 
 
 def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
-    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for one that is not positive, or
-    not one for each place."""
+    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for what is no bound."""
     found = np.empty((count, 3))
     for k, bound in enumerate(limit.bounds(at)):
         said = f"limit '{limit.name}': {QUANTITIES[k]}"

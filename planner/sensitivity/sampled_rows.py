@@ -125,9 +125,8 @@ def add_places(rows: Rows, lines: Lines, at: Layout, outer: FloatArray) -> None:
         rows.add(of, sign * way.tangent[:, None] / within, 1.0)
     before, after = (np.zeros(way.point.shape) for _ in range(2))
     before[lines.window + 1] = after[lines.window] = way.tangent
-    before[lines.begins], after[lines.ends] = (
-        one / np.maximum(np.linalg.norm(one, axis=1), TINY)[:, None] for one in outer
-    )
+    unit = outer / np.maximum(np.linalg.norm(outer, axis=2), TINY)[..., None]
+    before[lines.begins], after[lines.ends] = unit
     turn = after - before
     size = np.linalg.norm(turn, axis=1)
     inner = ~way.stop

@@ -37,10 +37,8 @@ class Way(NamedTuple):
 
     def of(self, nodes: Array | slice, legs: Array | slice) -> "Way":
         """Some of the waypoints, and some of the legs."""
-        return self._replace(
-            **{name: getattr(self, name)[nodes] for name in NODES},
-            **{name: getattr(self, name)[legs] for name in LEGS},
-        )
+        cut = {name: getattr(self, name)[nodes] for name in NODES}
+        return self._replace(**cut, **{name: getattr(self, name)[legs] for name in LEGS})
 
     def part(self, begin: int, end: int) -> "Way":
         """The legs `begin` to `end` - 1."""
@@ -82,9 +80,8 @@ def way_of(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...]) -
     point, segment = polyline(toolpath, count)
     last = np.append(np.diff(segment) > 0, True)  # of a segment: its end is a joint
     joint = segment + 1
-    tolerance = np.where(
-        last, toolpath.tolerance[joint], np.maximum(toolpath.tolerance[segment], toolpath.tolerance[joint])
-    )
+    wider = np.maximum(toolpath.tolerance[segment], toolpath.tolerance[joint])
+    tolerance = np.where(last, toolpath.tolerance[joint], wider)
     kind = np.where(last, toolpath.joint[joint], Joint.SMOOTH)
     point = np.vstack([toolpath.start[:1], point])
     feed = np.where(toolpath.rapid, np.inf, np.minimum(toolpath.feed, machine.feed_max or np.inf))[segment]

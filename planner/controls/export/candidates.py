@@ -92,15 +92,13 @@ class Candidates:
 
     @cached_property
     def room(self) -> float | None:
-        """How far chords may miss the planned motion [mm]; None if that is nothing. Raises InputError as
-        `used`."""
+        """How far chords may miss the planned motion [mm], None if that is nothing. Raises as `used` does."""
         left = self.tolerance - self.used
         return None if left < 2.0 * ROUNDING else left - ROUNDING
 
     @cached_property
     def used(self) -> float:
-        """The part of the tolerance that the plan uses [mm]. Raises InputError if the motion leaves the
-        program."""
+        """What the plan uses of the tolerance [mm]. Raises InputError if the motion leaves the program."""
         verdict = self.plan.verdict
         assert verdict is not None
         if verdict.contour_error_mm is None or verdict.vertex_error_mm is None:
@@ -133,8 +131,7 @@ class Candidates:
         return [Candidate(name=name, line=line, replaced=replaced)]
 
     def _replaced(self, *, planned: bool) -> Array:
-        """(R,) the rows whose moves are written as chords: all that can be, or those that the control has no
-        words for."""
+        """(R,) the rows that are written as chords: all that can be, or those that have no words there."""
         control, reading = self.control, self.source.program.reading
 
         def is_replaced(row: Row) -> bool:
@@ -146,8 +143,7 @@ class Candidates:
         return np.array([row.plain and is_replaced(row) for row in self.source.rows], dtype=bool)
 
     def written(self, chosen: Candidate) -> tuple[bytes, tuple[str, ...]]:
-        """The file of a candidate, and notes on it. Raises InputError for a line that the control has no
-        words for."""
+        """The file of a candidate, and notes on it. Raises InputError for a line without words there."""
         if (
             chosen.replaced is None
         ):  # the path mode is on a line of its own, after the percent sign if there is one
@@ -158,13 +154,11 @@ class Candidates:
             return self.text[:cut] + mode + self.text[cut:], ()
         machine, line = self.plan.machine, chosen.line
         step = np.abs(np.diff(line.points, axis=0))
-        most = machine.limits("velocity", self.plan.toolpath.axes) * np.linalg.norm(
-            step, axis=1, keepdims=True
-        )
+        size = np.linalg.norm(step, axis=1, keepdims=True)
+        most = machine.limits("velocity", self.plan.toolpath.axes) * size
         rapid = np.divide(most, step, out=np.full_like(step, np.inf), where=step > 0.0).min(axis=1)
-        lines, notes = Translator(
-            self.source, self.control, machine, chosen.replaced, line, rapid
-        ).translated()
+        writer = Translator(self.source, self.control, machine, chosen.replaced, line, rapid)
+        lines, notes = writer.translated()
         head = head_of(self.source, self.control, self.plan, self.tolerance, chosen.name)
         text = "\n".join([*head, *[chosen.mode] * bool(chosen.mode), *lines, ""])
         return text.encode("ascii", "replace"), notes

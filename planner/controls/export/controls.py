@@ -18,6 +18,7 @@ from planner.nc.settings import EVERYTHING
 
 _STAYS = "this control always stays on the path"
 _STRAIGHT = "what it would choose is written out as straight moves"
+_ALL_OFF = "this control does not look at its words, and would let go of all motors at once"
 _NOT_USED = "the control has no such mode"
 
 
@@ -73,9 +74,24 @@ _IDLE_ON_PRINTERS = {
     "G54": "this control has no work offsets: its zero is the program's",
     "G94": "F is always per minute there",
 }
-_PRINTER = frozenset(
-    (17, 18, 82, 83, 84, 104, 105, 106, 107, 109, 114, 115, 117, 118, 119, 140, 190, 204, 220, 221, 400)
-)
+_PRINTER = {
+    17,
+    18,
+    82,
+    83,
+    84,
+    *range(104, 108),
+    109,
+    114,
+    115,
+    *range(117, 120),
+    140,
+    190,
+    204,
+    220,
+    221,
+    400,
+}
 
 GRBL = Control(
     name="grbl",
@@ -95,15 +111,11 @@ KLIPPER = Control(
     name="klipper",
     g=frozenset((0, 10, 40, 210, 280, 900, 910, 920)),
     m=frozenset(),
-    settings=_PRINTER - {17} | {73, 110, 112} | set(range(20, 28)),
+    settings=frozenset(_PRINTER - {17} | {73, 110, 112, *range(20, 28)}),
     commands=r"G28[XYZ\s]*0*|M11[78]\b.*|SET_VELOCITY_LIMIT\b.*",
     idle={**_IDLE_ON_PRINTERS, "M17": "motors are on from their first move"},
     unheard={
-        # klippy/extras/stepper_enable.py
-        **dict.fromkeys(
-            ("M18", "M84"),
-            (EVERYTHING, "this control does not look at its words, and would let go of all motors at once"),
-        ),
+        **dict.fromkeys(("M18", "M84"), (EVERYTHING, _ALL_OFF)),  # klippy/extras/stepper_enable.py
         **dict.fromkeys(("M109", "M190"), ("R", "")),  # without S it would switch the heater off
     },
     instead=dict.fromkeys(("M0", "M1", "M60", "M6"), "PAUSE"),
@@ -123,7 +135,9 @@ MARLIN = replace(
     idle=_IDLE_ON_PRINTERS,
     unheard={},
     commands=r"G28[XYZ\s]*0*|M11[78]\b.*",
-    settings=_PRINTER | {73, 75, 76, 77, 85, 110, 111, 112, 113, 155, 201, 203, 205, 301, 302, 420, 851, 900},
+    settings=frozenset(
+        _PRINTER | {73, 75, 76, 77, 85, *range(110, 114), 155, 201, 203, 205, 301, 302, 420, 851, 900}
+    ),
     instead={"M60": "M0", "M6": "M0"},
     number=False,  # a line number needs a checksum on the serial line
 )
@@ -153,8 +167,7 @@ def is_setting(words: list[Word], control: Control) -> bool:
 
 
 def sets_tools(row: Row) -> bool:
-    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z, which grbl
-    lacks."""
+    """Whether G10 or G43.1 say what grbl lacks: more than an origin (L1, L10, L11; R), or a length in Z."""
     kind, g = row.value("L"), row.g()
     more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
     return (G10 in g and more) or (431 in g and (row.value("X") or row.value("Y")) is not None)

@@ -152,8 +152,7 @@ def head_of(source: Source, control: Control, plan: Plan, tolerance: float, what
 
 
 def assumptions(source: Source, *, as_it_is: bool = False) -> list[str]:
-    """The assumptions on coordinates and start, in words; `as_it_is` where all lines are the program's
-    own."""
+    """The assumptions on coordinates and start; `as_it_is` where all lines are the program's own."""
     program = source.program
     used = sorted({code for row in source.rows for code in row.g() if codes.G_GROUP[code] == "work offset"})
     system = " ".join(system_name(code) for code in used) or "the work offset in force"

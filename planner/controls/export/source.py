@@ -40,9 +40,9 @@ def source_of(plan: Plan) -> Source:
             "which has the caps as F words, and export that",
             source=program.source,
         )
-    if text is None and not program.pen:
-        return rows_of(*_of_points(program), plan.machine)
     if text is None:
+        if not program.pen:
+            return rows_of(*_of_points(program), plan.machine)
         feeds = np.where(np.isfinite(program.feed), program.feed, FEED_MIN)
         return _read(program_text(program, feeds, 1.0).encode(), plan, "as an NC program")
     if program.expansion is None:
@@ -77,11 +77,8 @@ def _same(text: bytes, plan: Plan, reading: Reading, how: str) -> Program:
 
 def same_places(one: Program, other: Program) -> bool:
     """Whether two programs have the same kinds of blocks with the same ends."""
-    return (
-        one.end.shape == other.end.shape
-        and np.array_equal(one.kind, other.kind)
-        and np.allclose(one.end, other.end, rtol=0.0, atol=SAME_PLACE)
-    )
+    same = one.end.shape == other.end.shape and np.array_equal(one.kind, other.kind)
+    return same and np.allclose(one.end, other.end, rtol=0.0, atol=SAME_PLACE)
 
 
 def _of_points(program: Program) -> tuple[bytes, Program]:
@@ -100,10 +97,8 @@ def _of_points(program: Program) -> tuple[bytes, Program]:
 
 
 def _words(place: np.ndarray) -> str:
-    return " ".join(
-        f"{letter}{plain(round(float(value), DECIMALS + 3) + 0.0)}"
-        for letter, value in zip("XYZ", place, strict=False)  # points may have no z
-    )
+    written = (plain(round(float(value), DECIMALS + 3) + 0.0) for value in place)
+    return " ".join(map("".join, zip("XYZ", written, strict=False)))  # points may have no z
 
 
 SAME_FEED = 1e-6  # by its size: what writing a program out rounds

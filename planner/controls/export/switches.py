@@ -135,8 +135,7 @@ class Switches(Output):
             self._say(text)
 
     def _know_diameter(self, row: Row, code: int) -> None:
-        """Refuse the radius of a tool that the machine file does not have: its centre would go along the
-        contour."""
+        """Refuse the radius of a tool without a diameter: its centre would go along the contour."""
         word = row.value("D")
         number = word.text if word is not None else self.tool[1:]
         tool = self.machine.tools.get(str(int(float(number)))) if number else None

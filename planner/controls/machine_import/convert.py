@@ -36,8 +36,7 @@ CONTROLS: dict[str, ModuleType] = {"linuxcnc": linuxcnc, "klipper": klipper, "ma
 
 @dataclass(frozen=True)
 class Imported:
-    """text : of the machine file; machine : what it holds; assumed : what the settings do not say, one
-    sentence each"""
+    """text of the machine file; what it holds; what the settings do not say, one sentence each"""
 
     text: str
     machine: Machine
@@ -164,9 +163,8 @@ def _text(
     lines.append(f'path_control = "{found.path_control or "blend"}"')
     lines += [_line("feed_max", found.feed_max)] if found.feed_max else []
     for letter, limits in axes.items():
-        lines += _table(f"axes.{letter}", limits) + ["wrapped = true  # WRAPPED_ROTARY"] * (
-            letter in found.wrapped
-        )
+        lines += _table(f"axes.{letter}", limits)
+        lines += ["wrapped = true  # WRAPPED_ROTARY"] * (letter in found.wrapped)
     if found.inch or found.lathe:
         lines += ["", "[dialect]", *["inch = true  # G20 is in force at the start"] * found.inch]
         lines += ["lathe = false  # X is a radius until G7"] * found.lathe

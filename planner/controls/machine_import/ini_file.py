@@ -47,8 +47,7 @@ class _Line(NamedTuple):
 
 
 def read_linuxcnc_ini(text: str, source: str) -> Settings:
-    """The settings of an INI file, as LinuxCNC reads it. Raises InputError for files that include each
-    other."""
+    """An INI file, as LinuxCNC reads it. Raises InputError for files that include each other."""
     ini = Settings(begins=True)
     table: str | None = None
     pending = ""

@@ -9,7 +9,14 @@ import re
 
 from planner.base.errors import InputError
 from planner.controls.machine_import.ini_file import read_klipper_config
-from planner.controls.machine_import.settings import ControlSettings, FoundMode, Settings, Sourced, least
+from planner.controls.machine_import.settings import (
+    ControlSettings,
+    Ends,
+    FoundMode,
+    Settings,
+    Sourced,
+    least,
+)
 
 _PER_AXIS = ("cartesian", "corexy", "hybrid_corexy", "corexz", "hybrid_corexz", "generic_cartesian")
 _MACRO = re.compile(r"gcode_macro\s+(\w+(?:\.\d+)?)", re.IGNORECASE | re.ASCII)
@@ -25,14 +32,12 @@ def recognised(text: str) -> bool:
 
 
 def settings(text: str, source: str) -> ControlSettings:
-    """The settings of a printer.cfg. Raises InputError for kinematics without limits of their own for x, y
-    and z."""
+    """Of a printer.cfg. Raises InputError for kinematics without limits of their own for x, y and z."""
     config = read_klipper_config(text, source)
     kinematics = config.text("printer", "kinematics")
     if kinematics is not None and kinematics not in _PER_AXIS:
-        said = (
-            f"[printer] kinematics is {kinematics}; limits of x, y and z are known for {', '.join(_PER_AXIS)}"
-        )
+        known = ", ".join(_PER_AXIS)
+        said = f"[printer] kinematics is {kinematics}; limits of x, y and z are known for {known}"
         raise InputError(said, source=source)
     limits = {}
     for key in ("velocity", "accel"):
@@ -73,9 +78,8 @@ def _notes(config: Settings) -> list[str]:
     if "extruder" in config.names:
         said.append("limits of [extruder] are left out: a table [axes.e] takes them")
     if "gcode_arcs" not in config.names:
-        said.append(
-            "Klipper reads no G2 and G3 here, for want of [gcode_arcs]: programs with arcs fail on it"
-        )
+        arcs = "Klipper reads no G2 and G3 here, for want of [gcode_arcs]: programs with arcs fail on it"
+        said.append(arcs)
     macros = [_MACRO.fullmatch(name) for name in config.names]
     renamed = [macro[1].upper() for macro in macros if macro and config.text(macro[0], "rename_existing")]
     if renamed:
@@ -97,8 +101,8 @@ def _macros(config: Settings) -> dict[str, str]:
     return macros
 
 
-def _travel(config: Settings) -> dict[str, tuple[Sourced | None, Sourced | None]]:
-    travel: dict[str, tuple[Sourced | None, Sourced | None]] = {}
+def _travel(config: Settings) -> dict[str, Ends]:
+    travel: dict[str, Ends] = {}
     for letter in "xyz":
         low, high = (config.number(f"stepper_{letter}", f"position_{end}") for end in ("min", "max"))
         if high is not None:

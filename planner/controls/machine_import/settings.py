@@ -1,5 +1,4 @@
-"""Settings of a control as they stand in its text, and what they say about a machine; each number with its
-place."""
+"""Settings of a control as they stand in its text, and what they say about a machine."""
 
 from __future__ import annotations
 
@@ -21,6 +20,9 @@ class Sourced(NamedTuple):
     place: str
 
 
+Ends = tuple[Sourced | None, Sourced | None]  # the lower and the upper one
+
+
 class FoundMode(NamedTuple):
     """A vibration mode: frequency [Hz], damping ratio [-], and where it stands."""
 
@@ -31,16 +33,13 @@ class FoundMode(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ControlSettings:
-    """The settings of one control, in mm (degrees for rotary axes) and s. By axis letter where they are
-    mappings."""
+    """The settings of one control, in mm (rotary axes: degrees) and s; mappings are by axis letter."""
 
     control: str
     velocity: Mapping[str, Sourced]
     acceleration: Mapping[str, Sourced]
     jerk: Mapping[str, Sourced] = field(default_factory=dict)
-    travel: Mapping[str, tuple[Sourced | None, Sourced | None]] = field(
-        default_factory=dict
-    )  # machine coordinates
+    travel: Mapping[str, Ends] = field(default_factory=dict)  # in machine coordinates [mm, deg]
     wrapped: str = ""  # letters of rotary axes whose places are within a turn
     feed_max: Sourced | None = None  # largest feed along the path [mm/s]
     dt: Sourced | None = None  # interpolation period [s]

@@ -147,10 +147,8 @@ def predicted_times(
     if control.square_corner_velocity is not None:
         lost = 2.0 * length * np.minimum(accel, (1.0 - control.minimum_cruise_ratio) * accel_max)
         parts = pairwise([0, *(np.flatnonzero(stands[1:-1]) + 1), len(length)])
-        found = [
-            _smoothed_times(length[i:k], top[i:k] ** 2, accel[i:k], bound[i : k + 1], lost[i:k])
-            for i, k in parts
-        ]
+        of = length, top**2, accel
+        found = [_smoothed_times(*(one[i:k] for one in of), bound[i : k + 1], lost[i:k]) for i, k in parts]
         times[moves] = control.factor * np.concatenate(found)
         return times
     gain = 2.0 * accel * length
@@ -220,8 +218,8 @@ def _corner_sq(
 
 
 def reachable(bound: FloatArray, gain: FloatArray) -> FloatArray:
-    """(n+1,) squares of speeds, each at most its bound (n+1,), that blocks with 2 a l = gain (n,) lead to,
-    and lead on from."""
+    """(n+1,) squares of speeds at most `bound` (n+1,) that blocks with 2 a l = gain (n,) lead to and on
+    from."""
     s = np.append(0.0, np.cumsum(gain))
     back = np.minimum.accumulate((bound + s)[::-1])[::-1] - s
     found: FloatArray = np.minimum.accumulate(back - s) + s
@@ -243,8 +241,7 @@ def stoppable(gain: FloatArray, blocks: int, seen: Array) -> FloatArray:
 def move_times(
     length: FloatArray, accel: FloatArray, x0: FloatArray, peak: FloatArray, x1: FloatArray
 ) -> FloatArray:
-    """(n,) times of blocks of a length (n,) from x0 over a peak to x1 (n,), squares of speeds, with constant
-    accel (n,)."""
+    """(n,) times of blocks from x0 over a peak to x1, squares of speeds, with constant accel, (n,) all."""
     v0, v, v1 = np.sqrt(x0), np.sqrt(np.maximum(peak, np.maximum(x0, x1))), np.sqrt(x1)
     even = np.maximum(length - (2.0 * v * v - x0 - x1) / (2.0 * accel), 0.0)  # way without acceleration
     times: FloatArray = (2.0 * v - v0 - v1) / accel + even / np.maximum(v, STANDING)

@@ -59,8 +59,7 @@ class ControlTimes:
 
 
 def control_named(name: str | None, machine: Machine) -> str:
-    """The control to be timed: the named one, or the machine's. Raises InputError where there is no model of
-    it."""
+    """The control to be timed, named or the machine's. Raises InputError where there is no model of it."""
     found = name or (machine.control.name if machine.control is not None else None)
     if found not in TIMED:
         what = "the machine names no control" if found is None else f"there is no model of {found}"
@@ -239,9 +238,8 @@ def tools_of(program: Program) -> list[str] | None:
 def named_parts(program: Program, text: bytes) -> tuple[list[str] | None, list[str] | None]:
     """(B,) the operation and the layer of each block; None where the text names none."""
     number = _line_number(text)
-    texts = [
-        (number(one), (one[1] or one[2] or b"").decode("utf-8", "replace")) for one in _COMMENT.finditer(text)
-    ]
+    comments = ((number(one), one[1] or one[2] or b"") for one in _COMMENT.finditer(text))
+    texts = [(line, words.decode("utf-8", "replace")) for line, words in comments]
     said = [(line, name.strip()) for line, name in texts if name.strip()]
     types = [(line, name[5:]) for line, name in said if name.startswith("TYPE:")]
     marked = [(line, found[1]) for line, name in said if (found := _LAYER.match(name))]

@@ -212,10 +212,9 @@ def strokes(t: FloatArray, x: FloatArray) -> FloatArray:
         room = LEAST + (last - first) // 4  # of the standstill on either side
         begin = max(runs[k - 1][1] + 1 if k else 0, first - room)
         end = min(runs[k + 1][0] if k + 1 < len(runs) else len(x), last + room)
-        if end - begin >= LEAST and (
-            one := _stroke(t[begin:end] - t[first], x[begin:end], t[last] - t[first], noise)
-        ):
-            found.append(one)
+        if end - begin >= LEAST:
+            one = _stroke(t[begin:end] - t[first], x[begin:end], t[last] - t[first], noise)
+            found += [one] if one else []
     return np.array(found).reshape(-1, 4)
 
 

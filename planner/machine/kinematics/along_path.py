@@ -28,8 +28,7 @@ def joints_along(
 
 
 def points_along(chain: Chain, axes: tuple[str, ...], motion: FloatArray, radius: float = 1.0) -> FloatArray:
-    """(4, n, A) the controlled point where `motion` (4, n, A) is that of the joints; the rest as in
-    `joints_along`."""
+    """(4, n, A) the controlled point for a `motion` (4, n, A) of the joints; else as `joints_along`."""
     return _along(chain.point, axes, motion, radius)
 
 

@@ -54,8 +54,7 @@ class Kinematics(Protocol):
         ...
 
     def joints(self, place: dict[str, Any]) -> dict[str, Any]:
-        """The linear joints x, y, z at a place: numbers, arrays (n,), or series of derivatives, by their
-        letters [mm, rad]."""
+        """The linear joints by their letters: numbers, arrays (n,), or series of derivatives [mm, rad]."""
         ...
 
 

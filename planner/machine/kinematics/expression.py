@@ -70,9 +70,8 @@ def expression(axes: str, joints: Callable[..., Sequence[Any]]) -> Expression:
     p, t = casadi.SX.sym("p", len(letters)), casadi.SX.sym("t")
     given = joints(*casadi.vertsplit(p))
     if len(given) != len(LINEAR):
-        raise InputError(
-            f"kinematics: the function returns {len(given)} joints; it must return three: x, y, z"
-        )
+        said = f"kinematics: the function returns {len(given)} joints"
+        raise InputError(f"{said}; it must return three: x, y, z")
     q = casadi.vertcat(*given)
     try:
         value = casadi.Function("joints", [p], [q])

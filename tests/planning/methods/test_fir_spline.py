@@ -14,8 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.jobs import problems
+from planner.base.arrays import FloatArray
 from planner.baselines.fir.chord_guide import ChordGuide
-from planner.baselines.fir.chord_speeds import circle_error, filter_lengths, two_nodes, v_eps, v_ph, v_sc
+from planner.baselines.fir.chord_speeds import filter_lengths, two_nodes, v_eps, v_ph, v_sc
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine
@@ -25,6 +26,13 @@ from planner.planning.methods.fir_spline import FirSplineMethod, guide_of
 MACHINE = problems.machine()
 T1, T2 = 0.05, 0.03  # the papers' filters
 GAUSS, WEIGHT = np.polynomial.legendre.leggauss(40)
+
+
+def circle_error(rho: FloatArray, v: FloatArray, T1: float, T2: float) -> FloatArray:
+    """(n,) how far inside a circle of radius `rho` (n,) [mm] the filtered point runs at speeds v (n,) [mm/s]: exact, the module
+    text of baselines/fir/chord_speeds.py. T1, T2 : filters [s]."""
+    lag = v / (2.0 * np.pi * rho)  # np.sinc(x) is sin(pi x)/(pi x)
+    return rho * (1.0 - np.sinc(lag * T1) * np.sinc(lag * T2))
 
 
 def mean_on_circle(rho: float, v: float, T1: float, T2: float) -> complex:

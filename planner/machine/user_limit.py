@@ -145,7 +145,7 @@ class ScaledLimit:
         """Velocity, acceleration and jerk of the limit at the places, the scaled one times `factor`."""
         bounds = list(self._limit.bounds(at))
         bounds[self._which] = bounds[self._which] * self._factor
-        return tuple(bounds)  # type: ignore[return-value]
+        return tuple(bounds)
 
     def value(self, at: Place) -> Any:
         """q of the limit at the places; scaling does not change it."""

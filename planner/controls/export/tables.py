@@ -119,8 +119,9 @@ def _write_joints(directory: Path, trajectory: Trajectory, rows: Array, joints: 
     for t, p, v in zip(trajectory.t[rows].tolist(), position.tolist(), velocity.tolist(), strict=True):
         sec, nanosec = divmod(round(t * _NANOSECONDS), _NANOSECONDS)
         when = {"sec": sec, "nanosec": nanosec}
-        still = {"accelerations": [], "effort": []}
-        points.append({"positions": p, "velocities": v, **still, "time_from_start": when})
+        points.append(
+            {"positions": p, "velocities": v, "accelerations": [], "effort": [], "time_from_start": when}
+        )
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     text = json.dumps({"header": header, "joint_names": [*names], "points": points})
     (directory / "trajectory.json").write_text(text + "\n", encoding="utf-8")

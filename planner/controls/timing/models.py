@@ -147,8 +147,10 @@ def predicted_times(
     if control.square_corner_velocity is not None:
         lost = 2.0 * length * np.minimum(accel, (1.0 - control.minimum_cruise_ratio) * accel_max)
         parts = pairwise([0, *(np.flatnonzero(stands[1:-1]) + 1), len(length)])
-        of = length, top**2, accel
-        found = [_smoothed_times(*(one[i:k] for one in of), bound[i : k + 1], lost[i:k]) for i, k in parts]
+        found = [
+            _smoothed_times(length[i:k], top[i:k] ** 2, accel[i:k], bound[i : k + 1], lost[i:k])
+            for i, k in parts
+        ]
         times[moves] = control.factor * np.concatenate(found)
         return times
     gain = 2.0 * accel * length

@@ -114,8 +114,8 @@ def spliced(planned: Polyline, own: Polyline, program: Program, groups: Sequence
             points.append(ends)
             parts.append((of, which, fast))
     feed, block, rapid = (np.concatenate(column) for column in zip(*parts, strict=True))
-    points, miss = np.vstack(points), max(planned.miss, own.miss)
-    return Polyline(points=points, feed=feed, block=block, rapid=rapid, miss=miss)
+    vertices, miss = np.vstack(points), max(planned.miss, own.miss)
+    return Polyline(points=vertices, feed=feed, block=block, rapid=rapid, miss=miss)
 
 
 def groups(rows: list[Row], replaced: Array) -> list[Group]:

@@ -236,8 +236,9 @@ class _Follower:
         self.simple = np.isin(program.kind, MOVES)
         self.simple[program.synchronised] = False
         before = np.vstack([program.start, program.end])
-        step, axes = np.diff(before, axis=0) != 0.0, program.axes
-        self.turns = {c.upper(): step[:, k] for k, c in enumerate(axes) if c.upper() not in LINEAR}
+        step = np.diff(before, axis=0) != 0.0
+        letters = enumerate(map(str.upper, program.axes))
+        self.turns = {letter: step[:, k] for k, letter in letters if letter not in LINEAR}
 
     def follow(self, rows: list[Row]) -> None:
         """Fill in the rows."""

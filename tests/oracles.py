@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from planner.base.arrays import FloatArray
+from planner.corners.kinematic import entry_acceleration
 
 
 def _needs(package: str) -> pytest.MarkDecorator:
@@ -20,6 +21,14 @@ def _needs(package: str) -> pytest.MarkDecorator:
 
 
 needs_ruckig, needs_toppra = _needs("ruckig"), _needs("toppra")
+
+
+def entry_length(V: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
+    """(n,) tangent length d = Vc Tc / 3 [mm] of kinematic corners with speeds V (n,) [mm/s] at their ends, which take Tc = 2 Vc / Ac.
+
+    a, J : (n,) limits of acceleration and jerk [mm/s2], [mm/s3]
+    """
+    return 2 * V**2 / (3 * entry_acceleration(V, a, J))
 
 
 def residual_vibration(

@@ -91,9 +91,8 @@ def part(function: Callable[..., Any], settings: dict[str, Any]) -> Any:
     numba_s = made.get_call_template
 
     def of_any_value(args: Any, kws: Any) -> Any:
-        return numba_s(
-            [types.unliteral(of) for of in args], {k: types.unliteral(of) for k, of in kws.items()}
-        )
+        named = {name: types.unliteral(of) for name, of in kws.items()}
+        return numba_s([types.unliteral(of) for of in args], named)
 
     made.get_call_template = of_any_value
     return made
@@ -107,11 +106,8 @@ def whole(function: Callable[..., Any], settings: dict[str, Any], cache: KernelC
 
 
 class KernelCache(caching.NullCache):
-    """numba's cache of a whole, in files with a checksum from safe folders (kernel_files.py).
-
-    function : of Python
-    content  : `content_of` it; None for one that is not kept
-    """
+    """numba's cache of a whole, in files with a checksum from safe folders (kernel_files.py), for a function
+    of Python whose `content_of` is known; None for one that is not kept."""
 
     def __init__(self, function: Any, content: bytes | None):
         self._function, self._content = function, content
@@ -142,11 +138,8 @@ class KernelCache(caching.NullCache):
                 kernel_files.warn_once(fault)
 
     def _file(self, sig: Any, generator: Any) -> KernelFile:
-        settings = sorted(
-            item
-            for item in os.environ.items()
-            if item[0].startswith("NUMBA_") and item[0] not in _NOT_OF_CODE
-        )
+        given = {k: v for k, v in os.environ.items() if k.startswith("NUMBA_") and k not in _NOT_OF_CODE}
+        settings = sorted(given.items())
         types_and_tools = repr((tuple(sig), generator.magic_tuple(), numba.__version__, settings))
         assert self._content is not None
         return kernel_files.place(self._function, self._content, types_and_tools)

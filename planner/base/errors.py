@@ -1,7 +1,5 @@
 """Kinds of failure, and how they are reported.
 
-There are three:
-
 * bad input            an `InputError`, raised before any work: file, line and column, what was found and what is allowed;
 * an unsolved problem  a status with a sentence and a remedy; `require()` turns it into `NotSolvedError`;
 * a bug of ours        an assertion or an uncaught exception.
@@ -23,9 +21,8 @@ def import_needed(package: str, user: str, extra: str = "") -> Any:
         if fault.name != package.partition(".")[0]:
             raise  # it is there, and something that it needs is not
         wanted = f"'feedrate-planner[{extra}]'" if extra else fault.name
-        raise InputError(
-            f"{user} needs the package {fault.name}, which is not installed: pip install {wanted}"
-        ) from None
+        said = f"{user} needs the package {fault.name}, which is not installed: pip install {wanted}"
+        raise InputError(said) from None
 
 
 class PlannerError(Exception):

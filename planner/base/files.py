@@ -1,5 +1,4 @@
-"""Reading input files: only what ends. A device may deliver for ever, and a named pipe without a writer
-never. And names of files in texts that are written."""
+"""Reading input files that end, unlike devices and named pipes; and file names in texts."""
 
 import os
 import stat
@@ -26,18 +25,13 @@ def readable(text: str) -> str:
 
 
 def require_ending(path: str | Path) -> None:
-    """Raise InputError if `path` is a device, a socket or a named pipe but those of a shell (`STREAMS`).
-
-    Raises OSError where there is no such file.
-    """
+    """Raise InputError if `path` is a device, a socket or a pipe but a shell's; OSError without a file."""
     mode = os.stat(path).st_mode
     if stat.S_ISREG(mode) or stat.S_ISDIR(mode) or (stat.S_ISFIFO(mode) and str(path).startswith(STREAMS)):
         return
     what = "a named pipe" if stat.S_ISFIFO(mode) else "a device or a socket"
-    raise InputError(
-        f"this is {what}; give a regular file, or the output of a program by | and /dev/stdin",
-        source=str(path),
-    )
+    said = f"this is {what}; give a regular file, or the output of a program by | and /dev/stdin"
+    raise InputError(said, source=str(path))
 
 
 def standard_input() -> bytes:

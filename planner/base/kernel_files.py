@@ -183,10 +183,9 @@ def write(file: KernelFile, kernel: bytes) -> str:
                     opened.flush()
                     os.fsync(opened.fileno())  # or a power failure could leave the name without the content
                 os.replace(part, path)
-            except BaseException:  # Ctrl-C too
+            finally:  # Ctrl-C too
                 if os.path.exists(part):
                     os.remove(part)
-                raise
         except OSError as fault:
             faults.append(fault)
             continue
@@ -203,10 +202,8 @@ def used() -> list[str]:
 def folders() -> list[str]:
     """Where kernels are kept, the first one first: the directory that NUMBA_CACHE_DIR names; else beside the
     sources of a checkout, or the user's cache directory. An installation gets no further files: who removes
-    it removes all of it.
-
-    Folders that others can write are left out; one that NUMBA_CACHE_DIR names with a warning.
-    """
+    it removes all of it. Folders that others can write are left out; one that NUMBA_CACHE_DIR names with a
+    warning."""
     named = os.environ.get("NUMBA_CACHE_DIR")
     if named:
         folder = os.path.join(named, "planner")
@@ -214,11 +211,10 @@ def folders() -> list[str]:
         if not fault:
             return [folder]
         _say_once(f"NUMBA_CACHE_DIR: {folder} {fault}; compiled kernels are neither read nor kept there")
-    checkout = os.path.isfile(os.path.join(os.path.dirname(PACKAGE), "pyproject.toml"))
-    beside = [os.path.join(PACKAGE, "__pycache__", "kernels")] if checkout else []
-    return [
-        folder for folder in (*beside, os.path.join(_of_user(), "planner", "kernels")) if not fault_of(folder)
-    ]
+    places = [os.path.join(_of_user(), "planner", "kernels")]
+    if os.path.isfile(os.path.join(os.path.dirname(PACKAGE), "pyproject.toml")):
+        places.insert(0, os.path.join(PACKAGE, "__pycache__", "kernels"))
+    return [folder for folder in places if not fault_of(folder)]
 
 
 def _of_user() -> str:

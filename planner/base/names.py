@@ -46,12 +46,14 @@ class MethodName:
     joints: bool = False
 
 
+_FIR_SPLINE = "planner.planning.methods.fir_spline:FirSplineMethod"
+_OF_SEARCH = ("own", "ipopt", "fatrop")
 METHODS: dict[str, MethodName] = {
     OPTIMAL: MethodName(
         home="planner.planning.methods.optimal:OptimalMethod",
         shapes=True,
         joints=True,
-        solvers=("own", "ipopt", "fatrop"),
+        solvers=_OF_SEARCH,
     ),
     SECOND_ORDER: MethodName(
         home="planner.planning.methods.second_order:SecondOrderMethod",
@@ -63,13 +65,9 @@ METHODS: dict[str, MethodName] = {
     "kinematic": MethodName(home="planner.planning.methods.kinematic:KinematicMethod"),
     "fir": MethodName(home="planner.planning.methods.fir:FirMethod"),
     "fir-plain": MethodName(home="planner.planning.methods.fir:FirMethod", settings={"plain": True}),
-    "fir-spline": MethodName(home="planner.planning.methods.fir_spline:FirSplineMethod"),
-    "fir-spline-plain": MethodName(
-        home="planner.planning.methods.fir_spline:FirSplineMethod", settings={"plain": True}
-    ),
-    "tube": MethodName(
-        home="planner.planning.methods.tube:TubeMethod", joints=True, solvers=("own", "ipopt", "fatrop")
-    ),
+    "fir-spline": MethodName(home=_FIR_SPLINE),
+    "fir-spline-plain": MethodName(home=_FIR_SPLINE, settings={"plain": True}),
+    "tube": MethodName(home="planner.planning.methods.tube:TubeMethod", joints=True, solvers=_OF_SEARCH),
     "stop": MethodName(home="planner.planning.methods.stop:StopMethod"),
 }
 # Names of earlier versions, which keep working.
@@ -119,10 +117,9 @@ def users_of(setting: str) -> tuple[str, ...]:
 def smoothing(geometry: str | None, corner: str | None) -> tuple[str, str | None]:
     """The geometry, and the shape of single corners where it is `corners`; None: nothing was asked for.
 
-    A corner shape alone means single corners of that shape, and `corners` alone means Bezier corners. The
-    names `auto` and `spline` are taken as corners too.
-
-    Raises InputError for unknown names, and for a corner shape beside splines.
+    A corner shape alone means single corners of that shape, `corners` alone Bezier corners; `auto` and
+    `spline` are taken as corners too. Raises InputError for unknown names, and for a corner shape beside
+    splines.
     """
     geometry = None if geometry is None else geometry_name(geometry)
     corner = None if corner is None else corner_name(corner)
@@ -133,10 +130,8 @@ def smoothing(geometry: str | None, corner: str | None) -> tuple[str, str | None
     if corner is None:
         return geometry or AUTO, BEZIER if geometry == SINGLE_CORNERS else None
     if geometry in (AUTO, SPLINE):
-        raise InputError(
-            f"corner = {corner} is a shape of single corners, and geometry {geometry} smooths the path by splines; "
-            f"use geometry {SINGLE_CORNERS}"
-        )
+        said = f"corner = {corner} is a shape of single corners, and geometry {geometry} smooths the path by splines"
+        raise InputError(f"{said}; use geometry {SINGLE_CORNERS}")
     return SINGLE_CORNERS, corner
 
 

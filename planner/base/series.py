@@ -26,14 +26,15 @@ class Series(NDArrayOperatorsMixin):
         self.derivatives = derivatives
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **settings: Any) -> Any:
-        given = [a if isinstance(a, Series) else _constant(a, self.derivatives) for a in inputs]
         if method != "__call__" or settings or ufunc not in (*FUNCTIONS, *OPERATIONS):
             known = ", ".join(sorted(f.__name__ for f in (*FUNCTIONS, *OPERATIONS)))
             raise TypeError(f"{ufunc.__name__} has no derivatives here; there are {known}")
+        given = [a if isinstance(a, Series) else _constant(a, self.derivatives) for a in inputs]
         if ufunc in FUNCTIONS:
             return Series(_chain(given[0].derivatives, FUNCTIONS[ufunc](given[0].derivatives[0])))
         if ufunc is np.power and not isinstance(inputs[1], Series):
-            return _power(given[0], float(inputs[1]))
+            base = given[0].derivatives
+            return Series(_chain(base, _power_derivatives(base[0], float(inputs[1]))))
         return Series(OPERATIONS[ufunc](*(a.derivatives for a in given)))
 
 
@@ -45,25 +46,15 @@ def _constant(value: Any, like: FloatArray) -> Series:
 
 def _chain(c: FloatArray, f: tuple[FloatArray, ...]) -> FloatArray:
     """The module's text: f holds the function and its derivatives at c[0]."""
-    return np.stack(
-        [
-            f[0] + 0.0 * c[0],
-            f[1] * c[1],
-            f[1] * c[2] + f[2] * c[1] ** 2,
-            f[1] * c[3] + 3.0 * f[2] * c[1] * c[2] + f[3] * c[1] ** 3,
-        ]
-    )
+    first, second = f[1] * c[1], f[1] * c[2] + f[2] * c[1] ** 2
+    third = f[1] * c[3] + 3.0 * f[2] * c[1] * c[2] + f[3] * c[1] ** 3
+    return np.stack([f[0] + 0.0 * c[0], first, second, third])
 
 
 def _product(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.stack(
-        [
-            a[0] * b[0],
-            a[1] * b[0] + a[0] * b[1],
-            a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2],
-            a[3] * b[0] + 3.0 * (a[2] * b[1] + a[1] * b[2]) + a[0] * b[3],
-        ]
-    )
+    first, second = a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]
+    third = a[3] * b[0] + 3.0 * (a[2] * b[1] + a[1] * b[2]) + a[0] * b[3]
+    return np.stack([a[0] * b[0], first, second, third])
 
 
 def _quotient(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -77,10 +68,6 @@ def _power_derivatives(c: FloatArray, n: float) -> tuple[FloatArray, ...]:
         found.append(factor * c ** (n - k) if factor else np.zeros_like(c))
         factor *= n - k
     return tuple(found)
-
-
-def _power(base: Series, n: float) -> Series:
-    return Series(_chain(base.derivatives, _power_derivatives(base.derivatives[0], n)))
 
 
 def _angle(y: FloatArray, x: FloatArray) -> FloatArray:

@@ -16,7 +16,6 @@ A size beyond which something is refused is no setting: there is no large way be
 """
 
 import os
-from collections.abc import Set
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -41,8 +40,9 @@ class Sizes:
     times_at_once: int = _size(PARTS, 100_000, 350)  # of a finely sampled motion: 20 MB
     row_group: int = _size(PARTS, 2**18, 101)  # samples in memory while a file is written: 35 MB
     text_rows: int = _size(PARTS, 100_000, 60)  # setpoints written as text together: 10 MB
-    # of a program in a language that are executed together, at most
-    program_rows: int = _size(PARTS, 100_000, 50)
+    program_rows: int = _size(
+        PARTS, 100_000, 50
+    )  # of a program in a language that are executed together, at most
     idle_rows: int = _size(PARTS, 2_000, 20)  # the same at first, and as long as nothing moves
     turns_at_once: int = _size(PARTS, 500, 5)  # of loops and jumps between two looks at their number
 
@@ -116,13 +116,10 @@ def chosen(said: str) -> Sizes:
     kinds = {word.strip() for word in said.split(",") if word.strip()}
     unknown = sorted(kinds - {SMALL, *KINDS})
     if unknown:
-        raise InputError(
-            f"{VARIABLE}={said}: no kind of sizes is called {unknown[0]}; there are {SMALL}, {', '.join(KINDS)}"
-        )
-    return _with_small(set(KINDS) if SMALL in kinds else kinds)
-
-
-def _with_small(kinds: Set[str]) -> Sizes:
+        known = ", ".join((SMALL, *KINDS))
+        raise InputError(f"{VARIABLE}={said}: no kind of sizes is called {unknown[0]}; there are {known}")
+    if SMALL in kinds:
+        kinds = {*KINDS}
     small = {size.name: size.metadata["small"] for size in fields(Sizes) if size.metadata["kind"] in kinds}
     return replace(USUAL, **small)
 

@@ -125,12 +125,6 @@ def entry_acceleration(V: FloatArray, a: FloatArray, J: FloatArray) -> FloatArra
     return np.minimum(a, np.sqrt(2 * J * V))
 
 
-def entry_length(V: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
-    """(n,) tangent length d = Vc Tc / 3 [mm] at the speeds V (n,) > 0 [mm/s]; the corner takes Tc = 2 Vc /
-    Ac. a, J as before."""
-    return 2 * V**2 / (3 * entry_acceleration(V, a, J))
-
-
 def entry_speed_from_middle(m: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
     """(n,) largest speed Vc [mm/s] with the middle value m = d/8 = eps / (2 sin(theta/2)) (n,) [mm]; a, J
     (n,) from `entry_limits`."""

@@ -12,9 +12,8 @@ from planner.base.files import require_ending
 from planner.base.names import known_name
 from planner.machine.whole import Machine
 
-# What settings of a control have and no machine file has: sections of LinuxCNC and Klipper, numbers of grbl,
-# commands of Marlin.
 _DECIMAL = re.compile(r"^[^#\"'\[]*=\s*(\d+),(\d+)\s*(?:#.*)?$", re.MULTILINE)  # 0,001
+# Of settings of a control: sections of LinuxCNC and Klipper, numbers of grbl, commands of Marlin.
 _SETTINGS = re.compile(
     r"^\s*(\[(EMC\w*|TRAJ|AXIS_\w|printer)\]|\$\d+\s*=|(echo:)?\s*M20[13]\s+X)", re.MULTILINE
 )
@@ -30,13 +29,10 @@ def load_machine(path: str | Path) -> Machine:
     Raises InputError naming file, key, value and what is allowed, for all faults at once.
     """
     if not isinstance(path, (str, Path)):
-        raise InputError(
-            f"a machine is a file, the name of a built-in one, or planner.Machine(...); found a {type(path).__name__}"
-        )
-    if str(path) in builtin_machines():
-        text, source = builtin_text(str(path)), str(path)
-    else:
-        text, source = _read(Path(path)), str(path)
+        what = "a file, the name of a built-in one, or planner.Machine(...)"
+        raise InputError(f"a machine is {what}; found a {type(path).__name__}")
+    source = str(path)
+    text = builtin_text(source) if source in builtin_machines() else _read(Path(path))
     deep = "not a machine file: its values are nested too deep"
     if _DEEP.search(text):  # Python's reader takes the square of the depth
         raise InputError(deep, source=source)
@@ -45,14 +41,10 @@ def load_machine(path: str | Path) -> Machine:
     except RecursionError:
         raise InputError(deep, source=source) from None
     except ValueError as fault:
-        settings = (
-            "; a machine file is made of a control's settings by: planner machine import"
-            if _SETTINGS.search(text)
-            else ""
-        )
-        reason = (
-            fault if isinstance(fault, tomllib.TOMLDecodeError) else "a number has more than 4,300 digits"
-        )
+        settings = "; a machine file is made of a control's settings by: planner machine import"
+        settings *= bool(_SETTINGS.search(text))
+        is_toml = isinstance(fault, tomllib.TOMLDecodeError)
+        reason = fault if is_toml else "a number has more than 4,300 digits"
         decimal = _DECIMAL.search(text)
         comma = f"; decimals have a point: {decimal[1]}.{decimal[2]}" if decimal else ""
         raise InputError(f"not valid TOML: {reason}{comma}{settings}", source=source) from fault
@@ -60,8 +52,7 @@ def load_machine(path: str | Path) -> Machine:
 
 
 def machine_from_dict(data: dict[str, Any], *, source: str | None = None) -> Machine:
-    """A machine from nested dictionaries with the keys of a machine file. Raises InputError for all faults at
-    once."""
+    """A machine from dictionaries with the keys of its file. Raises InputError for all faults at once."""
     try:
         return Machine(**data)
     except InputError as fault:
@@ -78,8 +69,7 @@ def builtin_machines() -> tuple[str, ...]:
 
 def builtin_text(name: str) -> str:
     """The commented TOML of a built-in machine. Raises InputError for an unknown name."""
-    if name not in builtin_machines():
-        known_name("built-in machine", name, builtin_machines())
+    known_name("built-in machine", name, builtin_machines())
     return (resources.files("planner") / "machines" / f"{name}.toml").read_text(encoding="utf-8")
 
 

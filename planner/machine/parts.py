@@ -1,5 +1,4 @@
-"""Records of the tables of a machine file, in mm, s and, for rotary axes, degrees. They do not change once
-they are made."""
+"""Records of the tables of a machine file, in mm, s and, for rotary axes, degrees."""
 
 from __future__ import annotations
 
@@ -21,12 +20,12 @@ M_DIGITS = 5  # of an M code: no control has more
 # Keys of [times].
 TIMED_BY_NAME = {3: "spindle_start", 4: "spindle_start", 5: "spindle_stop", 6: "tool_change"}
 
-# Smallest and largest magnitude of a number of a machine file, in the unit of its key. No machine has any
-# beyond them, and their products and quotients are numbers: third powers of a magnitude beyond 1e100 are not.
+# Smallest and largest magnitude of a number of a machine file, in the unit of its key: products and quotients
+# of what machines have are numbers then.
 MAGNITUDE_MIN, MAGNITUDE_MAX = 1e-12, 1e12
-# Smallest tolerance [mm]: 10 nm, finer than a machine follows. The shorter the way through a corner, the
-# shorter the steps in which its feed is sought: `planner plan` takes 1.4 CPU s for two blocks with 1e-5 mm,
-# 28 with 1e-6, and 53 with 1e-7.
+# Smallest tolerance [mm], finer than a machine follows. The shorter the way through a corner, the shorter the
+# steps in which its feed is sought: `planner plan` takes 1.4 CPU s for two blocks with 1e-5 mm, 28 with 1e-6,
+# and 53 with 1e-7.
 TOLERANCE_MIN = 1e-5
 # Of velocities and accelerations, 1e5 times gravity [mm/s, mm/s2]: how closely the verifier looks between
 # samples, and how long it takes, grows with the acceleration.
@@ -44,9 +43,9 @@ def _up_to(largest: float, least: float = MAGNITUDE_MIN) -> Callable[[float], fl
     return checked
 
 
+Finite = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_up_to(MAGNITUDE_MAX))]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_up_to(MAGNITUDE_MAX))]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(_up_to(MAGNITUDE_MAX))]
-Finite = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_up_to(MAGNITUDE_MAX))]
 Tolerance = Annotated[
     float, Field(gt=0, allow_inf_nan=False), AfterValidator(_up_to(MAGNITUDE_MAX, TOLERANCE_MIN))
 ]
@@ -54,8 +53,7 @@ AxisLimit = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_u
 
 
 class Record(BaseModel):
-    """Frozen, without other keys than its own. To set one raises AttributeError, which says how to make
-    another record."""
+    """Frozen, without other keys than its own. To set one raises AttributeError."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 
@@ -101,9 +99,8 @@ class Fir(Record):
     its setpoints are a setting of that method instead.
 
     time_constants : their lengths [s], any number, in any order
-    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; kept
-                     by methods `optimal` and `second-order` everywhere and by `bezier` at its corners; the
-                     other methods do not use it
+    phase_lag_max  : largest turning of the path within half of their delay, kappa feed sum T / 2 [deg]; kept by methods
+                     `optimal` and `second-order` everywhere, by `bezier` at its corners, by the others not
     """
 
     time_constants: Annotated[tuple[Positive, ...], Field(min_length=1)]
@@ -188,11 +185,10 @@ class ControlData(Record):
     """The settings of the control's own planner, for predictions of how long it takes
     (controls/timing/models.py); None for its default."""
 
-    # of the control; the other keys count for programs that are written for it
     name: Literal["grbl", "klipper", "marlin", "reprapfirmware", "linuxcnc"]
     acceleration: Positive | None = None  # largest along the path [mm/s2]: Klipper's max_accel, Marlin's M204
     square_corner_velocity: NotNegative | None = None  # of Klipper, speed at a corner of 90 degrees [mm/s]
-    # of Klipper [-], the share of the way that is not to be sped up and braked on
+    # of Klipper [-]: the share of the way that is not to be sped up and braked on
     minimum_cruise_ratio: Annotated[float, Field(ge=0, lt=1)] | None = None
     junction_deviation: NotNegative | None = None  # of grbl ($11) and Marlin (M205 J) [mm]
     # of Marlin (M205 X Y Z), by axis: the jump of velocity that a corner may have [mm/s]
@@ -203,12 +199,9 @@ class ControlData(Record):
 XYZAC, XYZBC, HEAD_TABLE, HEAD_HEAD = "xyzac-trt", "xyzbc-trt", "head-table", "head-head"
 TILTING = ("a", "b")  # letters of the axis that tilts; the other one is c
 # What each type has beside the point of rotation and the tool's length.
-_KEYS = {
-    XYZAC: ("y_offset", "z_offset"),
-    XYZBC: ("x_offset", "z_offset"),
-    HEAD_TABLE: ("x_offset", "y_offset", "pivot_length", "tilt"),
-    HEAD_HEAD: ("x_offset", "y_offset", "pivot_length", "tilt"),
-}
+_OFFSETS, _HEAD = ("x_offset", "y_offset", "z_offset"), ("x_offset", "y_offset", "pivot_length", "tilt")
+_KEYS = {XYZAC: _OFFSETS[1:], XYZBC: _OFFSETS[::2], HEAD_TABLE: _HEAD, HEAD_HEAD: _HEAD}
+_POINT = ("x_rot_point", "y_rot_point", "z_rot_point")
 
 
 class KinematicsData(Record):
@@ -241,13 +234,12 @@ class KinematicsData(Record):
     @model_validator(mode="after")
     def _of_this_type(self) -> KinematicsData:
         allowed = _KEYS[self.type]
-        for key in ("x_offset", "y_offset", "z_offset", "pivot_length", "tilt"):
+        for key in (*_OFFSETS, "pivot_length", "tilt"):
             if key in self.model_fields_set and key not in allowed:
                 raise ValueError(f"'{key}' is not used by type {self.type}; it has {', '.join(allowed)}")
-        if self.type == HEAD_HEAD:
-            for key in ("x_rot_point", "y_rot_point", "z_rot_point"):
-                if key in self.model_fields_set:
-                    raise ValueError(f"'{key}' is not used by type {self.type}: its table does not turn")
+        for key in _POINT if self.type == HEAD_HEAD else ():
+            if key in self.model_fields_set:
+                raise ValueError(f"'{key}' is not used by type {self.type}: its table does not turn")
         for letter in self.reversed:
             if letter not in self.rotary:
                 raise ValueError(f"reversed: '{letter}' is no axis of type {self.type}; it has {self.axes}")
@@ -257,9 +249,7 @@ class KinematicsData(Record):
     def _keys_of_this_type(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """The keys that its type has, as they are read again."""
         found: dict[str, Any] = written(self)
-        absent = {key for keys in _KEYS.values() for key in keys} - {*_KEYS[self.type]}
-        if self.type == HEAD_HEAD:
-            absent |= {"x_rot_point", "y_rot_point", "z_rot_point"}
+        absent = {*_OFFSETS, *_HEAD} - {*_KEYS[self.type]} | {*(_POINT if self.type == HEAD_HEAD else ())}
         return {key: value for key, value in found.items() if key not in absent}
 
     @property

@@ -49,15 +49,9 @@ class Place:
     depend on it, and `block`, the program's block there (n,), where it is known."""
 
     def __init__(
-        self,
-        axes: tuple[str, ...],
-        columns: Sequence[Any],
-        direction: FloatArray,
-        block: Array | None = None,
+        self, axes: tuple[str, ...], columns: Sequence[Any], direction: FloatArray, block: Array | None = None
     ):
-        self.axes = axes
-        self.direction = direction
-        self.block = block
+        self.axes, self.direction, self.block = axes, direction, block
         self._columns = dict(zip(axes, columns, strict=True))
 
     def __getattr__(self, letter: str) -> Any:
@@ -72,8 +66,9 @@ class OwnLimit(Protocol):
 
     name: str  # what the verdict calls it: "velocity.NAME", "acceleration.NAME", "jerk.NAME"
     unit: str  # of q
-    # what q may jump by because it starts again, 2 pi for an angle of arctan2; None if it does not
-    turn: float | None
+    turn: (
+        float | None
+    )  # what q may jump by because it starts again, 2 pi for an angle of arctan2; None for nothing
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
         """Largest velocity, acceleration and jerk at the places; inf where nothing limits."""
@@ -90,9 +85,7 @@ class PathLimit:
     name: str = ""
     unit: str = "mm"
     turn: float | None = None
-    counts: ClassVar[tuple[str, ...] | None] = (
-        None  # letters of the axes whose common way it is; None: of all
-    )
+    counts: ClassVar[tuple[str, ...] | None] = None  # the axes whose common way it is; None: all
 
     def velocity(self, at: Place) -> Any:
         """Largest speed [mm/s] at the places (n,)."""
@@ -116,8 +109,7 @@ class PathLimit:
 
 
 class JointLimit(ABC):
-    """Bounds on velocity, acceleration and jerk of a function of the position; inf for those that are not
-    bounded."""
+    """Bounds on velocity, acceleration and jerk of a function of the position; inf for none."""
 
     name: str = ""
     unit: str = "mm"
@@ -142,8 +134,7 @@ class JointLimit(ABC):
 
 
 class ScaledLimit:
-    """A limit with `factor` times the bounds of one of its quantities ("velocity", "acceleration", "jerk"),
-    else the same."""
+    """A limit with `factor` times the bounds of one of its `QUANTITIES`, else the same."""
 
     def __init__(self, limit: OwnLimit, quantity: str, factor: float):
         self.name, self.unit, self.turn = limit.name, limit.unit, limit.turn
@@ -152,11 +143,9 @@ class ScaledLimit:
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
         """Velocity, acceleration and jerk of the limit at the places, the scaled one times `factor`."""
-        velocity, acceleration, jerk = (
-            bound * self._factor if k == self._which else bound
-            for k, bound in enumerate(self._limit.bounds(at))
-        )
-        return velocity, acceleration, jerk
+        bounds = list(self._limit.bounds(at))
+        bounds[self._which] = bounds[self._which] * self._factor
+        return tuple(bounds)
 
     def value(self, at: Place) -> Any:
         """q of the limit at the places; scaling does not change it."""
@@ -170,43 +159,37 @@ def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
             raise InputError(f"limits: {limit.__name__} is a class; give an object of it, {limit.__name__}()")
         for method in ("bounds", "value"):
             if not callable(getattr(limit, method, None)):
-                raise InputError(
-                    f"limits: {limit!r} is not a limit; derive its class from PathLimit or JointLimit"
-                )
+                said = f"limits: {limit!r} is not a limit; derive its class from PathLimit or JointLimit"
+                raise InputError(said)
         if not limit.name or "." in limit.name:
-            raise InputError(
-                f"limits: {type(limit).__name__} is called '{limit.name}'; a name without dots is needed"
-            )
+            said = f"limits: {type(limit).__name__} is called '{limit.name}'; a name without dots is needed"
+            raise InputError(said)
         if limit.name in taken or sum(limit.name == other.name for other in limits) > 1:
-            raise InputError(
-                f"limits: the name '{limit.name}' is taken; axes and limits need names of their own"
-            )
+            said = f"limits: the name '{limit.name}' is taken; axes and limits need names of their own"
+            raise InputError(said)
 
 
 def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
-    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for one that is not positive, or
-    not one for each place."""
+    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for what is no bound."""
     found = np.empty((count, 3))
     for k, bound in enumerate(limit.bounds(at)):
+        said = f"limit '{limit.name}': {QUANTITIES[k]}"
         if np.ndim(bound) and np.shape(bound) != (count,):
+            shape = np.shape(bound)
             raise InputError(
-                f"limit '{limit.name}': {QUANTITIES[k]} has the shape {np.shape(bound)}; it must be one number, or one for each of the "
-                f"{count} places"
+                f"{said} has the shape {shape}; it must be one number, or one for each of the {count} places"
             )
         found[:, k] = bound
         if not (found[:, k] > 0.0).all():
             worst = int((~(found[:, k] > 0.0)).argmax())
             where = " ".join(f"{letter}{np.atleast_1d(getattr(at, letter))[worst]:.6g}" for letter in at.axes)
-            raise InputError(
-                f"limit '{limit.name}': {QUANTITIES[k]} {found[worst, k]:.6g} at {where}; it must be positive"
-            )
+            raise InputError(f"{said} {found[worst, k]:.6g} at {where}; it must be positive")
     return found
 
 
 def limit_derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
     """(3, n) the first three derivatives of q where the position has the value and the derivatives `motion`,
-    4 arrays (n, A), with respect to whatever they are with respect to. Raises InputError where they are not
-    finite."""
+    4 arrays (n, A), with respect to whatever they are. Raises InputError where they are not finite."""
     table = np.stack(motion)
     columns = [Series(table[:, :, k]) for k in range(len(axes))]
     found = limit.value(Place(axes, columns, table[1]))
@@ -235,6 +218,5 @@ def along_path(
     along = (acceleration * direction).sum(axis=1)
     across_sq = ((acceleration - along[:, None] * direction) ** 2).sum(axis=1)
     turning = np.divide(across_sq, speed, out=np.zeros_like(speed), where=moving)
-    return np.stack(
-        [speed, along, np.where(moving, (jerk * direction).sum(axis=1) + turning, 0.0)]
-    ), direction
+    change = np.where(moving, (jerk * direction).sum(axis=1) + turning, 0.0)
+    return np.stack([speed, along, change]), direction

@@ -51,11 +51,9 @@ class Machine(Record):
     """A machine. The template explains every key. Raises InputError for all faults at once.
 
     name                : of the machine
-    axes                : limits by axis letter, at least x and y; "e" is the extruder of a 3-D printer, in mm
-                          of filament
+    axes                : limits by axis letter, at least x and y; "e" is the extruder of a 3-D printer, in mm of filament
     dt                  : interpolation period [s]
-    interpolation       : what the machine does between two setpoints: "linear", "cubic" or "hold"
-                          (docs/files.md)
+    interpolation       : what it does between two setpoints: "linear", "cubic" or "hold" (docs/files.md)
     tolerance           : contour tolerance eps [mm]
     path_control        : what holds before the first G61, G61.1 or G64 of a program
     feed_max            : largest feed along the path [mm/s], or None
@@ -64,14 +62,11 @@ class Machine(Record):
     tangential_acceleration : largest acceleration along the path, of x, y and z together [mm/s2], or None
     tangential_jerk     : how fast that may change at most [mm/s3], or None
     blend_rapids        : whether joints between G0 and feed moves are rounded
-    rotary_radius       : [mm] at which rotary axes are measured: inside, an angle is a length there; None is
-                          `ROTARY_RADIUS`. A machine file may say `tolerance_angle` [deg] instead, the angle
-                          that is worth the tolerance
-    macros              : what the control does for an M code or T: the name of its macro, by the code ("M6"),
-                          for exports
+    rotary_radius       : [mm] at which an angle of a rotary axis is a length inside, or None: `ROTARY_RADIUS`. A machine
+                          file may say `tolerance_angle` [deg] instead, the angle that is worth the tolerance
+    macros              : the macros that the control runs for M codes, by the code ("M6"), for exports
     gcode_macros        : lines that Klipper runs for a command of that name
-    kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not
-                          known
+    kinematics          : how rotary axes carry workpiece and tool, or None: the tool centre point is not known
     control             : what is set in the control's own planner, or None: its defaults
     """
 
@@ -130,14 +125,13 @@ class Machine(Record):
         for name, given in limits.items():
             values = np.asarray(given, dtype=np.float64)
             if values.shape not in ((), (len(axes),)):
-                raise InputError(
-                    f"{name}: {values.size} limits for the axes '{axes}'; give one, or one for each"
-                )
+                said = f"{name}: {values.size} limits for the axes '{axes}'; give one, or one for each"
+                raise InputError(said)
             columns[name] = np.broadcast_to(values, len(axes)).tolist()
-        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         if len(set(axes)) < len(axes):
             raise InputError(f"axes '{axes}': give each letter once")
-        given_axes = dict(zip(axes, rows, strict=True))
+        rows = zip(*columns.values(), strict=True)
+        given_axes = {c: dict(zip(columns, row, strict=True)) for c, row in zip(axes, rows, strict=True)}
         return cls(**{"name": "machine", "dt": 0.001, "tolerance": 0.02, "axes": given_axes, **others})
 
     @model_validator(mode="before")
@@ -146,8 +140,8 @@ class Machine(Record):
         """`tolerance_angle` [deg], which stands for the radius at which it is the tolerance."""
         if not isinstance(data, dict) or "tolerance_angle" not in data:
             return data
-        rest = {key: value for key, value in data.items() if key != "tolerance_angle"}
-        angle, tolerance = data["tolerance_angle"], data.get("tolerance")
+        rest = dict(data)
+        angle, tolerance = rest.pop("tolerance_angle"), data.get("tolerance")
         if not isinstance(angle, int | float) or not 0 < angle < float("inf"):
             raise ValueError(f"tolerance_angle: must be above 0 [deg], found {angle!r}")
         if "rotary_radius" in data:
@@ -196,17 +190,15 @@ class Machine(Record):
                     raise ValueError(f"{table}: '{key}' is not known; allowed are {', '.join(allowed)}")
                 for letter in values:
                     if letter not in ALL_AXES:
-                        raise ValueError(
-                            f"{table}.{key}: axis '{letter}' is not known; allowed are {', '.join(ALL_AXES)}"
-                        )
+                        known = ", ".join(ALL_AXES)
+                        raise ValueError(f"{table}.{key}: axis '{letter}' is not known; allowed are {known}")
         for letter in self.kinematics.axes if self.kinematics else ():
             if letter not in self.axes:
                 raise ValueError(f"kinematics: axis '{letter}' is missing; write a table [axes.{letter}]")
         for code, name in self.macros.items():
             if not _MACRO_OF.fullmatch(code) or not _MACRO.fullmatch(name):
-                raise ValueError(
-                    f'macros: {code} = "{name}" is not known; write an M code and the name of a macro, e.g. M6 = "TOOL_CHANGE"'
-                )
+                said = f'macros: {code} = "{name}" is not known; write an M code and the name of a macro'
+                raise ValueError(f'{said}, e.g. M6 = "TOOL_CHANGE"')
         for tool in self.tools:
             if not tool.isdecimal() or len(tool) > TOOL_DIGITS:
                 raise ValueError(f"tools: '{tool[:TOOL_DIGITS]}' is not a tool number; write e.g. 1 = 25.0")
@@ -215,10 +207,8 @@ class Machine(Record):
     def limits(
         self, quantity: Literal["velocity", "acceleration", "jerk"], axes: tuple[str, ...]
     ) -> FloatArray:
-        """Limits (A,) of the axes for one quantity, in mm and s; of rotary axes at `radius`.
-
-        Raises InputError if the machine lacks one of the axes.
-        """
+        """Limits (A,) of the axes for one quantity, in mm and s; of rotary axes at `radius`. Raises
+        InputError if the machine lacks one of the axes."""
         for letter in axes:
             if letter not in self.axes:
                 raise InputError(
@@ -250,10 +240,8 @@ class Machine(Record):
         Machine(**_tables(self))
 
     def with_own(self, limits: Sequence[OwnLimit]) -> Machine:
-        """The machine with these limits of one's own, and no others.
-
-        Raises InputError for limits without a name, and for a name that is there already.
-        """
+        """The machine with these limits of one's own, and no others. Raises InputError for limits without a
+        name, and for a name that is there already."""
         check_names(limits, [*self.axes, TANGENTIAL])
         machine = self.model_copy()
         machine._own = tuple(limits)
@@ -272,15 +260,10 @@ def _tables(value: Any) -> Any:
 # The keys of the machine, under "", and of each table, that an unknown one may be meant for.
 _KEYS = {
     "": [*Machine.model_fields, "tolerance_angle"],
-    "axes": [*Axis.model_fields],
-    "fir": [*Fir.model_fields],
-    "modes": [*Mode.model_fields],
-    "plotter": [*Plotter.model_fields],
-    "dialect": [*DialectData.model_fields],
-    "times": [*Times.model_fields],
+    **{"axes": [*Axis.model_fields], "modes": [*Mode.model_fields], "tools": [*ToolData.model_fields]},
+    **{"fir": [*Fir.model_fields], "plotter": [*Plotter.model_fields], "times": [*Times.model_fields]},
+    **{"dialect": [*DialectData.model_fields], "control": [*ControlData.model_fields]},
     "kinematics": [*KinematicsData.model_fields],
-    "control": [*ControlData.model_fields],
-    "tools": [*ToolData.model_fields],
 }
 
 
@@ -288,31 +271,23 @@ FAULTS_SAID = 20  # the others are counted
 SHOWN = 60  # characters of a name or a value
 # What is needed where pydantic finds a fault of a type; {gt} and so on are its context.
 _NEEDED = {
-    "greater_than": "must be above {gt:g}",
-    "greater_than_equal": "must be {ge:g} or more",
-    "less_than": "must be below {lt:g}",
-    "finite_number": "must be a finite number",
-    "float_type": "must be a number",
-    "float_parsing": "must be a number",
-    "int_type": "must be a whole number",
-    "int_parsing": "must be a whole number",
-    "bool_type": "must be true or false",
-    "bool_parsing": "must be true or false",
-    "string_type": "must be a text",
-    "literal_error": "must be {expected}",
-    "dict_type": "must be a table",
-    "model_type": "must be a table",
-    "model_attributes_type": "must be a table",
-    "tuple_type": "must be a list",
-    "too_short": "must have at least {min_length} entry",
+    "greater_than": "above {gt:g}",
+    "greater_than_equal": "{ge:g} or more",
+    "less_than": "below {lt:g}",
+    "finite_number": "a finite number",
+    **dict.fromkeys(("float_type", "float_parsing"), "a number"),
+    **dict.fromkeys(("int_type", "int_parsing"), "a whole number"),
+    **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "a table"),
+    "string_type": "a text",
+    "literal_error": "{expected}",
+    "tuple_type": "a list",
 }
 
 
 def faults_in_words(fault: ValidationError, keys: Mapping[str, Sequence[str]]) -> str:
-    """The faults of a record, each with the key, what is needed and what was found.
-
-    keys : of the record, under "", and of each of its tables, under its name
-    """
+    """The faults of a record, each with the key, what is needed and what was found; `keys` of the record,
+    under "", and of each of its tables, under its name."""
     faults: list[str] = []
     found = fault.errors()
     for error in found:
@@ -331,7 +306,10 @@ def faults_in_words(fault: ValidationError, keys: Mapping[str, Sequence[str]]) -
             text = error["msg"].removeprefix("Value error, ")
             faults.append(f"{key}: {text}" if key else text)
         else:
-            needed = _NEEDED.get(error["type"], error["msg"]).format(**error.get("ctx", {}))
+            needed = f"must be {_NEEDED[error['type']]}" if error["type"] in _NEEDED else error["msg"]
+            if error["type"] == "too_short":
+                needed = "must have at least {min_length} entry"
+            needed = needed.format(**error.get("ctx", {}))
             faults.append(f"{key}: {needed}, found {shown(error['input'])}")
     return "; ".join(faults)
 

@@ -15,8 +15,7 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.solution import FeedrateSolution, active_names, ratios_by_limit
 from planner.sensitivity.records import GridHistory
 
-# An interval is held by a limit that it comes this close to [share of the limit].
-HELD = 1e-2
+HELD = 1e-2  # an interval is held by a limit that it comes this close to [share of the limit]
 NONE, REST = "none", "rest"
 
 
@@ -52,10 +51,6 @@ def history(problem: FeedrateProblem, solution: FeedrateSolution, t: FloatArray,
 
 
 def times_of(reached: Array, lasting: FloatArray) -> FloatArray:
-    """(n,) how long each of n limits is active [s].
-
-    reached : (P, n) whether it is
-    lasting : (P,) of the intervals [s]
-
-    As a product of matrices it would take `reached` as floats."""
+    """(n,) how long each of n limits is active [s]: of intervals `lasting` (P,), in which it is `reached` (P,
+    n). As a product of matrices it would take `reached` as floats."""
     return np.array([lasting[here].sum() for here in reached.T])

@@ -43,12 +43,9 @@ def legs_between(way: Way, bounds: Bounds, length: FloatArray, known: Array) -> 
 
 
 def confined(way: Way, across: FloatArray, within: FloatArray, lasting: FloatArray) -> FloatArray:
-    """(n,) the largest speed across a leg at its end [mm/s], UNLIMITED where the time is too short to tell.
-
-    across  : (n, A) the direction, of any length
-    within  : (n,) how far from the leg motions are at most [mm]
-    lasting : (n,) for how long before at least [s]
-    """
+    """(n,) the largest speed across a leg at its end [mm/s], UNLIMITED where the time is too short to tell:
+    in directions `across` (n, A) of any length, `within` (n,) of the leg [mm], for `lasting` (n,) before at
+    least [s]."""
     size = np.maximum(np.linalg.norm(across, axis=1), TINY)
     direction = np.abs(across) / size[:, None]
     push, jerk = (np.maximum(direction @ limit, TINY) for limit in way.limit[1:])

@@ -59,21 +59,17 @@ def found_history(
     start: GridHistory | None,
     alone: Mapping[int, GridHistory | None] = MappingProxyType({}),
 ) -> GridHistory | None:
-    """The active limits of a motion of runs `found` along a toolpath, of which the start's stays on those in
-    `kept`; None where the start's part in it does not tell.
-
-    motion : as it is delivered
-    start  : what held the start's motion
-    alone  : what held the motions of runs in `kept` that are planned by themselves, by their number
-    """
+    """The active limits of a motion of runs `found` along a toolpath, delivered as `motion`; None where the
+    start's part in it does not tell. The `start`'s history stays on the runs in `kept`, but for those planned
+    by themselves (`alone`)."""
     slowed = motion if isinstance(motion, Slowed) else Slowed(motion=motion, places=())
     motion = slowed.motion
     if not isinstance(motion, Spliced):
         return None
     axes = toolpath.axes
-    own = (*(kind.called(axis) for kind in (JERK, ACCELERATION, VELOCITY) for axis in axes),)
+    of_axes = (kind.called(axis) for kind in (JERK, ACCELERATION, VELOCITY) for axis in axes)
     of_laws = (one.run.laws.laws[m].name for one in found for m in one.run.laws.named)
-    own = (*own, FEED.name, CHORD_ERROR.name, TOLERANCE, *dict.fromkeys(of_laws))
+    own = (*of_axes, FEED.name, CHORD_ERROR.name, TOLERANCE, *dict.fromkeys(of_laws))
     known = [each.active_names[:-2] for each in (start, *alone.values()) if each is not None]
     others = tuple(dict.fromkeys(name for each in known for name in each if name not in own))
     names = (*own, *others, NONE, REST)

@@ -37,11 +37,11 @@ class RunPrices:
 
     leg, segment, middle : (N,) of the steps, and the place of their middles along the run [mm]
     step, alone          : (N, 3 A + 5 + M) of joint/price.py, without feed and velocities held together
-    room, normal, vertex : (R,), (R,), (R+1,) of what legs and vertices may use
+    vertex               : (R+1,) of what vertices may use
     """
 
     def __init__(self, toolpath: Toolpath, found: FoundRun, step: FloatArray, place: FloatArray):
-        """step : (N, 3 A + 5 + M) of joint/price.py; place : (N+1,) of the nodes along the run [mm]"""
+        """place : (N+1,) of the nodes along the run [mm]"""
         self.found, self.step, axes = found, step, len(found.run.axis)
         assert found.steps is not None
         least = TIED * found.steps.h
@@ -54,9 +54,7 @@ class RunPrices:
         first, last = found.run.first[0], found.run.first[-1]
         along = np.cumsum(toolpath.length[first : last - 1])
         self.segment = first + np.searchsorted(along, self.middle, side="right")
-        legs = len(found.run)
-        self.room = np.bincount(self.leg, self.of(price.ROOM), legs)
-        self.vertex = np.bincount(self.leg, self.of(price.VERTEX), legs + 1)
+        self.vertex = np.bincount(self.leg, self.of(price.VERTEX), len(found.run) + 1)
 
     def of(self, column: int) -> FloatArray:
         """(N,) prices of what is not of one axis."""
@@ -105,11 +103,8 @@ def found_prices(
     toolpath: Toolpath, machine: Machine, found: list[FoundRun], cycle_time: float
 ) -> PriceList | None:
     """The prices of runs along a toolpath, of a motion of `cycle_time` [s]; None if there are none."""
-    runs = [
-        RunPrices(toolpath, one, one.price, one.place)
-        for one in found
-        if one.price is not None and one.place is not None
-    ]
+    priced = [one for one in found if one.price is not None and one.place is not None]
+    runs = [RunPrices(toolpath, one, one.price, one.place) for one in priced]  # type: ignore[arg-type]
     if not runs:
         return None
     limit, slope = _of_limits(toolpath, machine, runs)

@@ -42,7 +42,7 @@ from planner.machine import Machine
 from planner.sensitivity.bends import Chains, best_division
 from planner.sensitivity.corner_speeds import legs_between
 from planner.sensitivity.sampled_lines import chain_times, chains_of, sampled_legs
-from planner.sensitivity.straight_time import TINY, Bounds, End, straight_time
+from planner.sensitivity.straight_time import TINY, End, straight_time
 from planner.sensitivity.turning_back import turns_of
 from planner.sensitivity.waypoints import Way, way_of
 
@@ -64,7 +64,10 @@ def least_time(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...
     way = way_of(toolpath, machine, not_limited)
     direction, by_axis = way.coordinates()
     bounds, y = way.along(direction, way.feed)
-    more = _beside_feed(way, bounds, (direction * np.diff(way.point, axis=0)).sum(axis=1), by_axis)
+    # what each line takes longer than at its feed, because of the corners and stops at its ends, in the
+    # coordinate that bounds it; where that is an axis the speed at corners is not known
+    legs = legs_between(way, bounds, (direction * np.diff(way.point, axis=0)).sum(axis=1), ~by_axis)
+    more = np.where(way.line, legs.time - legs.way / bounds.speed, 0.0)
     stops = np.flatnonzero(way.stop)
     of_run, y, leg = _best_of_runs(way, y, more, stops[:-1])
     chains = _chains(way, y, leg)
@@ -118,13 +121,6 @@ def _fitted(way: Way, y: FloatArray) -> FloatArray:
 def _jumps(way: Way, y: FloatArray) -> FloatArray:
     """(N-1,) what a change of y costs at the inner waypoints [s]; nothing at stops, which are passed exactly."""
     return way.tolerance[1:-1] * np.linalg.norm(np.diff(y, axis=0), axis=1)
-
-
-def _beside_feed(way: Way, bounds: Bounds, length: FloatArray, by_axis: Array) -> FloatArray:
-    """(N,) what each line takes longer than at its feed, because of the corners and stops at its ends [s]; `length` (N,)
-    in the coordinate that bounds it, of which the speed at corners is not known where that is an axis."""
-    legs = legs_between(way, bounds, length, ~by_axis)
-    return np.where(way.line, legs.time - legs.way / bounds.speed, 0.0)
 
 
 def _chains(way: Way, y: FloatArray, leg: FloatArray) -> Chains:

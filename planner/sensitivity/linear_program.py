@@ -23,23 +23,16 @@ FLAT = 1e-13  # of a pivot, added to it [-]: variables that hardly any row holds
 
 
 class Programme(NamedTuple):
-    """n variables in an order in which no row reaches further than `width` - 1; m rows of ascending columns.
+    """n variables in an order in which rows reach no further than `width` - 1; m rows of ascending columns."""
 
-    cost      : (n,)
-    first     : (m+1,) of each row in `column` and `value`
-    low, high : (m,) bounds; `low` is -inf where there is none
-    start     : (n,) strictly within all of them
-    reach     : (n,)
-    """
-
-    cost: FloatArray
-    first: Array
+    cost: FloatArray  # (n,)
+    first: Array  # (m+1,) of each row in `column` and `value`
     column: Array
     value: FloatArray
-    low: FloatArray
-    high: FloatArray
-    start: FloatArray
-    reach: FloatArray
+    low: FloatArray  # (m,) bounds; -inf where there is none
+    high: FloatArray  # (m,)
+    start: FloatArray  # (n,) strictly within all of them
+    reach: FloatArray  # (n,)
     width: int
 
 

@@ -60,6 +60,10 @@ def path_prices(
         saved[name] = -2.0 * now.feed_sq_max * (1.0 - np.sqrt(problem.feed_sq_max / more))
     every = -(now.rows + 2.0 * now.feed_sq_max) * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
     splines = len(samples.path.spline) > 0
+    kappa = np.maximum(samples.kappa_left, samples.kappa_right)
+    tolerance = toolpath.tolerance[samples.segment]
+    chord = kappa * solution.feed_sq * chord_rate(machine)  # kappa v^2 dt^2 / 8, eq. (18)
+    use = float(np.divide(chord, tolerance, out=np.zeros_like(chord), where=tolerance > 0.0).max())
 
     def by_segment(of_points: FloatArray) -> FloatArray:
         return np.bincount(samples.segment, of_points, len(toolpath)).astype(np.float64)
@@ -73,16 +77,16 @@ def path_prices(
         bounds={name: float(of.sum()) for name, of in saved.items()},
         unrest=UNREST if splines else 0.0,
         less=WITHIN if splines else LESS,
-        unsure=_chord_use(samples, solution, machine) > CHORDS,
+        unsure=use > CHORDS,
         corners=None,
         places=PlacePrices(feed=by_segment(saved[FEED.name]), limits=by_segment(every), tolerance=None),
     )
 
 
 def _by_share(problem: FeedrateProblem, now: Slopes) -> tuple[dict[str, float], dict[str, float]]:
-    """The limits of the axes and of one's own by their names, as far as they bound anything: the limit
-    itself, of one's own the least that was met, in its own unit; and dT/d(ln limit) [s], of bounds on the
-    feed too that come of it."""
+    """The limits of the axes and of one's own by their names, as far as they bound anything: the limit, of
+    one's own the least that was met, in its own unit; and dT/d(ln limit) [s], of bounds on the feed too that
+    come of it."""
     number = {name: k for k, name in enumerate(problem.bound_names)}
 
     def of_bounds(name: str) -> float:
@@ -100,20 +104,18 @@ def _by_share(problem: FeedrateProblem, now: Slopes) -> tuple[dict[str, float], 
             limit[name] = float(least)
             if kind is VELOCITY:
                 slope[name] = 2.0 * of_bounds(name)
-            elif kind is ACCELERATION:
-                slope[name] = float(now.acceleration[k]) + of_bounds(ACCELERATION.called_at_jump(axis))
-            else:
-                slope[name] = float(now.jerk[k])
+                continue
+            slope[name] = float(getattr(now, kind.name)[k])
+            if kind is ACCELERATION:
+                slope[name] += of_bounds(ACCELERATION.called_at_jump(axis))
     return limit, slope
 
 
 def bounds_with(
     samples: PathSamples, machine: Machine, name: str, share: float, rest: FloatArray | None = None
 ) -> FloatArray:
-    """(P,) bounds of feed^2 with a share more of the feed or of an axis velocity, by `name` [mm2/s2].
-
-    rest : the bounds by all other limits, from `bounds_but_speeds`, if they are known
-    """
+    """(P,) bounds of feed^2 with a share more of the feed or of an axis velocity, by `name` [mm2/s2]; `rest`
+    are those by all other limits, from `bounds_but_speeds`, if they are known."""
     toolpath = samples.path.toolpath
     if name == FEED.name:
         toolpath = dataclasses.replace(toolpath, feed=toolpath.feed * (1.0 + share))
@@ -131,11 +133,3 @@ def bounds_but_speeds(samples: PathSamples, machine: Machine) -> FloatArray | No
     if machine.own:
         return None
     return bounds_of(samples, machine, [limit for limit in LIMITS if limit not in SPEEDS])
-
-
-def _chord_use(samples: PathSamples, solution: FeedrateSolution, machine: Machine) -> float:
-    """The largest share of the tolerance that chords use, kappa v^2 dt^2 / 8 over eps, eq. (18)."""
-    kappa = np.maximum(samples.kappa_left, samples.kappa_right)
-    tolerance = samples.path.toolpath.tolerance[samples.segment]
-    chord = kappa * solution.feed_sq * chord_rate(machine)
-    return float(np.divide(chord, tolerance, out=np.zeros_like(chord), where=tolerance > 0.0).max())

@@ -32,14 +32,13 @@ from planner.sensitivity.records import SAVED_MIN, DearCorners, PlacePrices, Pri
 
 MORE_LIMIT = 0.1  # what is saved is told for so much more of a limit [-] ...
 MORE_TOLERANCE = 0.01  # ... and of the tolerance [mm]
-# Relative steps of differences [-]: far above rounding, and so small that no leg is opened or closed.
-STEP = 1e-6
+STEP = 1e-6  # relative steps of differences: far above rounding, and so small that no leg is opened or closed
 DEAREST = 10  # corners that are listed
 TOLERANCE = "tolerance"
 # T goes with limit^-n where a limit holds all of it, n [-]: lengths with speed, acceleration, jerk.
 POWER = {
-    **{JERK.name: 1.0 / 3.0, ACCELERATION.name: 0.5, VELOCITY.name: 1.0},
-    **{FEED.name: 1.0, TOLERANCE: 1.0 / 3.0, DRIVE_POWER.name: 1.0 / 3.0},
+    **dict.fromkeys((JERK.name, TOLERANCE, DRIVE_POWER.name), 1.0 / 3.0),
+    **{ACCELERATION.name: 0.5, VELOCITY.name: 1.0, FEED.name: 1.0},
 }
 WITHIN = 0.1  # how far a change foretold to 10 % more of a limit may be off [-] (benchmarks/solvers/found_prices.py)
 ROUNDING = 1e-9  # of sums over steps [-]
@@ -57,14 +56,6 @@ class Saving(NamedTuple):
     def middle(self) -> float:
         """The middle of the range [s]."""
         return 0.5 * (self.least + self.most)
-
-    def widened(self, by: float) -> Saving:
-        """The range with `by` [s] more on both sides."""
-        return Saving(self.least - by, self.most + by)
-
-    def below(self, bound: float) -> Saving:
-        """The range cut off at a bound [s]."""
-        return Saving(min(self.least, bound), min(self.most, bound))
 
     def vague(self, cycle_time: float) -> bool:
         """True if the middle may be off by too much to be told as a number."""
@@ -116,18 +107,19 @@ def price_list(
     less      : by how much more of a limit may save less than foretold [-]; of a steady feed `WITHIN`
     unsure    : whether more of anything may save nothing
     """
-    present = _present(toolpath)
+    inner = toolpath.tolerance[toolpath.joint != Joint.STOP]  # of most joints between blocks [mm]
+    present = float(np.median(inner if len(inner) else toolpath.tolerance))
     more = {name: Priced(name.partition(".")[0], slope[name], 1.0 + MORE_LIMIT) for name in slope}
     if tolerance is not None:
         more[TOLERANCE] = Priced(TOLERANCE, tolerance * present, 1.0 + MORE_TOLERANCE / present)
     saved, ranges = {}, {}
     for name, priced in more.items():
-        saving = priced.saving(bounds.get(name, np.inf), less)
+        least, longest = priced.saving(bounds.get(name, np.inf), less)
         if unsure:
-            saving = Saving(min(saving.least, 0.0), saving.most)
-        saving = saving.widened(unrest * cycle_time)
+            least = min(least, 0.0)
         most = cycle_time if name == TOLERANCE else cycle_time * (1.0 - 1.0 / (1.0 + MORE_LIMIT))
-        saved[name], ranges[name] = min(saving.middle, most), saving.below(most)
+        saving = Saving(least - unrest * cycle_time, longest + unrest * cycle_time)
+        saved[name], ranges[name] = min(saving.middle, most), Saving(*(min(one, most) for one in saving))
     return PriceList(
         limits={name: slope[name] / limit[name] for name in limit},
         feed=slope[FEED.name],
@@ -138,12 +130,6 @@ def price_list(
         hints=tuple(name for name, saving in ranges.items() if saving.vague(cycle_time)),
         places=places,
     )
-
-
-def _present(toolpath: Toolpath) -> float:
-    """The tolerance of most joints between blocks [mm]."""
-    inner = toolpath.tolerance[toolpath.joint != Joint.STOP]
-    return float(np.median(inner if len(inner) else toolpath.tolerance))
 
 
 def dearest(toolpath: Toolpath, price: FloatArray) -> DearCorners:

@@ -68,16 +68,11 @@ class DearCorners:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlacePrices:
-    """The prices by place: at the M segments of the programmed path and the M+1 joints between them.
+    """The prices by place: at the M segments of the programmed path and the M+1 joints between them."""
 
-    feed      : (M,) time saved by `MORE_LIMIT` more of the programmed feed of this segment alone [s]
-    limits    : (M,) time saved by `MORE_LIMIT` more of every limit on this segment, feed and axes [s]
-    tolerance : (M+1,) dT/d(tolerance at this joint) [s/mm], negative where more saves; None if unknown
-    """
-
-    feed: FloatArray
-    limits: FloatArray
-    tolerance: FloatArray | None
+    feed: FloatArray  # (M,) time saved by `MORE_LIMIT` more of the programmed feed of this segment alone [s]
+    limits: FloatArray  # (M,) the same of every limit on this segment, feed and axes [s]
+    tolerance: FloatArray | None  # (M+1,) dT/d(tolerance at this joint) [s/mm], negative where more saves
 
     def __post_init__(self) -> None:
         segments = len(self.feed)

@@ -103,8 +103,7 @@ def chains_of(run: Way, sampled: Sampled) -> Array:
 
 
 def chain_times(run: Way, sampled: Sampled, chains: Array, y: FloatArray) -> FloatArray:
-    """(P,) what chains of lines take at least, with what y (N, A) of the legs beside them makes of where they begin and end
-    [s]."""
+    """(P,) what chains of lines take at least, with what y (N, A) of the legs beside them makes of their ends [s]."""
     lines, at, outer, programme = programme_of(run, sampled, chains, y)
     part = at.part[at.gap]
     fixed = np.bincount(part, lines.front[:, -1] + lines.back[:, -1])
@@ -206,7 +205,7 @@ def ends_at_corners(
     free = rows.programme(np.zeros(n), np.zeros(n), _reach(lines, at))
     along, bounds = coordinate
     ends = []
-    for line, end in ((behind - 1, legs.end), (behind, legs.begin)):
+    for line, end in ((behind, legs.begin), (behind - 1, legs.end)):
         speed = np.where(end.rests, 0.0, bounds.speed)
         unit, direction = end.speed[line], along[line]  # what is known, as a unit
         cost = np.zeros(n)
@@ -217,28 +216,19 @@ def ends_at_corners(
         found += np.abs(direction) @ way.limit[2] * h * h_behind / 6.0
         speed[line] = np.minimum(speed[line], np.maximum(found, 0.0))
         ends.append(End(speed, end.rests))
-    return ends[1], ends[0]
+    return ends[0], ends[1]
 
 
 def lines_of(run: Way, sampled: Sampled, chains: Array, moved: Array) -> Lines:
-    """The lines of `chains` (P, 2), of which `sampled` is, and when corners are looked at alone; in the axes that `moved` (A,)."""
+    """The lines of `chains` (P, 2) when corners are looked at alone, in the axes that `moved` (A,)."""
     first, behind = chains.T
     count = behind - first
     chain = np.repeat(np.arange(len(first)), count)
     leg = np.concatenate([np.arange(*ends) for ends in chains])
     node = np.concatenate([np.arange(begin, end + 1) for begin, end in chains])
     window = np.arange(len(leg)) + chain
-    way = Way(
-        point=run.point[node][:, moved],
-        tolerance=run.tolerance[node],
-        stop=run.stop[node],
-        vertex=run.vertex[node],
-        tangent=run.tangent[leg][:, moved],
-        length=run.length[leg],
-        feed=run.feed[leg],
-        line=run.line[leg],
-        limit=run.limit[:, moved],
-    )
+    way = run.of(node, leg)
+    way = way._replace(point=way.point[:, moved], tangent=way.tangent[:, moved], limit=run.limit[:, moved])
     begins, ends = np.zeros(len(node), dtype=bool), np.zeros(len(node), dtype=bool)
     begins[np.append(0, np.cumsum(count + 1)[:-1])] = ends[np.cumsum(count + 1) - 1] = True
     speeds = ((way.tangent, sampled.speed),)

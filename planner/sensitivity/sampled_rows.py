@@ -15,40 +15,25 @@ NONE, RESTS = -2, -1  # instead of a variable: no sample, one that is at its way
 
 
 class Lines(NamedTuple):
-    """L lines of several chains, W = L + chains waypoints, of which line l joins window[l] and the next.
+    """L lines of several chains, W = L + chains waypoints, of which line l joins window[l] and the next."""
 
-    window : (L,)
-    way    : of these waypoints and lines only
-    front  : (L, S) times of samples behind the begin [s]
-    back   : (L, S) before the end
-    begins : (W,) whether a waypoint is the first of its chain
-    ends   : (W,) whether it is the last
-    speeds : directions (L, A), and the largest speed (L,) of each line in them
-    """
-
-    window: Array
-    way: Way
-    front: FloatArray
-    back: FloatArray
-    begins: Array
-    ends: Array
-    speeds: tuple[tuple[FloatArray, FloatArray], ...]
+    window: Array  # (L,)
+    way: Way  # of these waypoints and lines only
+    front: FloatArray  # (L, S) times of samples behind the begin [s]
+    back: FloatArray  # (L, S) before the end
+    begins: Array  # (W,) whether a waypoint is the first of its chain
+    ends: Array  # (W,) whether it is the last
+    speeds: tuple[tuple[FloatArray, FloatArray], ...]  # directions (L, A), and the largest speed (L,) in them
 
 
 class Layout(NamedTuple):
-    """The first variable of what belongs to lines and waypoints.
+    """The first variable of what belongs to lines and waypoints."""
 
-    waypoint    : (W,)
-    front, back : (L, S)
-    gap         : (L,)
-    part        : (n,) the chain of each variable
-    """
-
-    waypoint: Array
-    front: Array
-    back: Array
-    gap: Array
-    part: Array
+    waypoint: Array  # (W,)
+    front: Array  # (L, S)
+    back: Array  # (L, S)
+    gap: Array  # (L,)
+    part: Array  # (n,) the chain of each variable
 
 
 class Rows:
@@ -62,11 +47,8 @@ class Rows:
     def add(
         self, column: Array, value: FloatArray, high: FloatArray | float, two_sided: bool = False
     ) -> None:
-        """Rows of e entries each, at most `high` or, two-sided, that in size; those without a variable are left out.
-
-        column, value : (.., e) of the entries; `column` is negative for what is 0
-        high          : (..,)
-        """
+        """Rows of e entries each, `column` (.., e), negative for what is 0, and `value` (.., e), at most
+        `high` (..,) or, two-sided, that in size; those without a variable are left out."""
         column, value = np.broadcast_arrays(column, value)
         width, high = column.shape[-1], np.broadcast_to(high, column.shape[:-1]).ravel()
         column, value = column.reshape(-1, width), value.reshape(-1, width)
@@ -143,9 +125,8 @@ def add_places(rows: Rows, lines: Lines, at: Layout, outer: FloatArray) -> None:
         rows.add(of, sign * way.tangent[:, None] / within, 1.0)
     before, after = (np.zeros(way.point.shape) for _ in range(2))
     before[lines.window + 1] = after[lines.window] = way.tangent
-    before[lines.begins], after[lines.ends] = (
-        one / np.maximum(np.linalg.norm(one, axis=1), TINY)[:, None] for one in outer
-    )
+    unit = outer / np.maximum(np.linalg.norm(outer, axis=2), TINY)[..., None]
+    before[lines.begins], after[lines.ends] = unit
     turn = after - before
     size = np.linalg.norm(turn, axis=1)
     inner = ~way.stop
@@ -199,7 +180,5 @@ def add_gaps(rows: Rows, lines: Lines, at: Layout) -> None:
             of = np.concatenate([front[:, -order - 1 :] + k, back[:, -order - 1 :] + k, gap], axis=1)
             unit = apart[:, None] * way.limit[order, k]
             for sign in (1.0, -1.0):
-                value = np.concatenate(
-                    [sign * change[0], sign * change[1], np.full(gap.shape, -way.limit[order, k])], axis=1
-                )
-                rows.add(of, value / unit, 1.0)
+                unequal = [sign * change[0], sign * change[1], np.full(gap.shape, -way.limit[order, k])]
+                rows.add(of, np.concatenate(unequal, axis=1) / unit, 1.0)

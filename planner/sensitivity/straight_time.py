@@ -33,30 +33,9 @@ class Bounds(NamedTuple):
     jerk: FloatArray
 
 
-def straight_time(way: FloatArray, begin: End, end: End, most: Bounds) -> FloatArray:
-    """(n,) the least time for ways, or a little less [s].
-
-    way        : (n,) [mm]
-    begin, end : of each
-    most       : limits of each
-    """
-    return np.asarray(_straight_times(way, begin, end, most))
-
-
-def largest_speed(way: FloatArray, begin: FloatArray, end: FloatArray, most: Bounds) -> FloatArray:
-    """(n,) the largest speed on ways, or a little more [mm/s].
-
-    way        : (n,) [mm]
-    begin, end : (n,) speeds that are not exceeded at their ends [mm/s]
-    most       : limits of each
-    """
-    free = np.zeros(len(way), dtype=bool)
-    return np.asarray(_largest_speeds(way, End(begin, free), End(end, free), most))
-
-
 @njit(cache=True, error_model="numpy")
-def _straight_times(way, begin, end, most):
-    """`straight_time`."""
+def straight_time(way, begin, end, most):
+    """(n,) the least time for ways (n,) [mm] from `begin` to `end` within limits, or a little less [s]."""
     found = np.empty(len(way))
     for n in range(len(way)):
         top, push = most.speed[n], most.acceleration[n]
@@ -76,11 +55,11 @@ def _straight_times(way, begin, end, most):
 
 
 @njit(cache=True, error_model="numpy")
-def _largest_speeds(way, begin, end, most):
-    """`largest_speed`."""
-    found = np.empty(len(way))
+def largest_speed(way, begin, end, most):
+    """(n,) the largest speed on ways (n,) [mm] between ends with speeds (n,), or a little more [mm/s]."""
+    found, free = np.empty(len(way)), np.zeros(len(way), dtype=np.bool_)
     for n in range(len(way)):
-        found[n] = _between(way[n], n, begin, end, most)[1]
+        found[n] = _between(way[n], n, End(begin, free), End(end, free), most)[1]
     return found
 
 

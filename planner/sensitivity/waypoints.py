@@ -35,25 +35,23 @@ class Way(NamedTuple):
     line: Array
     limit: FloatArray
 
+    def of(self, nodes: Array | slice, legs: Array | slice) -> "Way":
+        """Some of the waypoints, and some of the legs."""
+        cut = {name: getattr(self, name)[nodes] for name in NODES}
+        return self._replace(**cut, **{name: getattr(self, name)[legs] for name in LEGS})
+
     def part(self, begin: int, end: int) -> "Way":
         """The legs `begin` to `end` - 1."""
-        nodes, legs = slice(begin, end + 1), slice(begin, end)
-        return self._replace(
-            **{name: getattr(self, name)[nodes] for name in NODES},
-            **{name: getattr(self, name)[legs] for name in LEGS},
-        )
+        return self.of(slice(begin, end + 1), slice(begin, end))
 
     def backwards(self) -> "Way":
         """From the end to the start."""
-        turned = self._replace(**{name: getattr(self, name)[::-1] for name in (*NODES, *LEGS)})
+        turned = self.of(slice(None, None, -1), slice(None, None, -1))
         return turned._replace(tangent=-turned.tangent)
 
     def along(self, direction: FloatArray, feed: FloatArray) -> tuple[Bounds, FloatArray]:
-        """The limits along directions, and vectors y (n, A) whose product with a velocity is at most 1 then.
-
-        direction : (n, A) unit vectors
-        feed      : (n,) that holds meanwhile [mm/s]
-        """
+        """The limits along unit vectors `direction` (n, A), with a `feed` (n,) [mm/s], and vectors y (n, A)
+        whose product with a velocity is at most 1 then."""
         size = np.maximum(np.abs(direction), TINY)
         speed = np.minimum(feed, size @ self.limit[0])
         return Bounds(speed, size @ self.limit[1], size @ self.limit[2]), direction / speed[:, None]
@@ -69,10 +67,8 @@ class Way(NamedTuple):
 
 
 def way_of(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...]) -> Way:
-    """The waypoints of a toolpath and the legs between them; lines that go straight on at the same feed are one leg.
-
-    not_limited : of velocity, acceleration and jerk, what has no limit
-    """
+    """The waypoints of a toolpath and the legs between them; lines that go straight on at the same feed are
+    one leg. Of velocity, acceleration and jerk, `not_limited` have no limit."""
     limits = Limits.of(machine, toolpath.axes)
     of_axes = np.minimum(limits.of_axes, UNLIMITED)
     for k, name in enumerate(("velocity", "acceleration", "jerk")):
@@ -84,9 +80,8 @@ def way_of(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...]) -
     point, segment = polyline(toolpath, count)
     last = np.append(np.diff(segment) > 0, True)  # of a segment: its end is a joint
     joint = segment + 1
-    tolerance = np.where(
-        last, toolpath.tolerance[joint], np.maximum(toolpath.tolerance[segment], toolpath.tolerance[joint])
-    )
+    wider = np.maximum(toolpath.tolerance[segment], toolpath.tolerance[joint])
+    tolerance = np.where(last, toolpath.tolerance[joint], wider)
     kind = np.where(last, toolpath.joint[joint], Joint.SMOOTH)
     point = np.vstack([toolpath.start[:1], point])
     feed = np.where(toolpath.rapid, np.inf, np.minimum(toolpath.feed, machine.feed_max or np.inf))[segment]

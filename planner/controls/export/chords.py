@@ -40,8 +40,7 @@ class Polyline:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Blocks from `first` to before `last`: whether chords replace them, and axes that the program has placed
-    before them."""
+    """Blocks from `first` to before `last`, whether chords replace them, and the axes placed before them."""
 
     first: int
     last: int
@@ -50,11 +49,9 @@ class Group:
 
 
 def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> Polyline:
-    """The planned motion as a polyline.
-
-    within : how far it may miss a setpoint [mm], above the rounding of coordinates
-    breaks : (K,) blocks before which something else happens, ascending; None for those of the program's
-             events
+    """The planned motion as a polyline that misses no setpoint by more than `within` [mm], above the rounding
+    of coordinates; `breaks` (K,) are the blocks before which something else happens, ascending, or None: the
+    program's events.
 
     Raises ValueError for a plan without a trajectory.
     """
@@ -68,17 +65,13 @@ def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> 
     block = trajectory.block[np.minimum(rows[:-1] + 1, rows[1:])]
     moves = (np.diff(points, axis=0) != 0).any(axis=1)
     points, feed, block = points[np.append(True, moves)], feed[moves], block[moves]
-    return Polyline(
-        points=points, feed=feed, block=block, rapid=plan.program.kind[block] == Kind.RAPID, miss=miss
-    )
+    rapid = plan.program.kind[block] == Kind.RAPID
+    return Polyline(points=points, feed=feed, block=block, rapid=rapid, miss=miss)
 
 
 def programmed_polyline(plan: Plan, within: float) -> Polyline:
     """The programmed path as a polyline, at the programmed feeds: straight moves as they are, arcs and curves
-    as chords.
-
-    within : how far chords may be from arcs and curves [mm]
-    """
+    as chords that are `within` of them [mm]."""
     toolpath = plan.toolpath
     chord = np.sqrt(8.0 * within / np.maximum(toolpath.curvature, 1e-12))
     count = np.where(toolpath.straight, 1, np.ceil(toolpath.length / chord)).astype(np.int64)
@@ -101,9 +94,7 @@ def spliced(planned: Polyline, own: Polyline, program: Program, groups: Sequence
     placed: the words around them may be relative, or shift the coordinates.
     """
     points = [own.points[:1]]
-    feed: list[FloatArray] = []
-    block: list[Array] = []
-    rapid: list[Array] = []
+    parts: list[tuple[FloatArray, Array, Array]] = []  # feed, block and whether it is rapid, of the moves
     for group in groups:
         line = planned if group.replaced else own
         begin, end = np.searchsorted(line.block, [group.first, group.last]).tolist()
@@ -120,15 +111,11 @@ def spliced(planned: Polyline, own: Polyline, program: Program, groups: Sequence
                 if a >= LINEAR or letter.upper() not in group.placed:
                     ends[:, a] = here[a]
         if len(ends):
-            for column, more in zip((points, feed, block, rapid), (ends, of, which, fast), strict=True):
-                column.append(more)
-    return Polyline(
-        points=np.vstack(points),
-        feed=np.concatenate(feed),
-        block=np.concatenate(block),
-        rapid=np.concatenate(rapid),
-        miss=max(planned.miss, own.miss),
-    )
+            points.append(ends)
+            parts.append((of, which, fast))
+    feed, block, rapid = (np.concatenate(column) for column in zip(*parts, strict=True))
+    vertices, miss = np.vstack(points), max(planned.miss, own.miss)
+    return Polyline(points=vertices, feed=feed, block=block, rapid=rapid, miss=miss)
 
 
 def groups(rows: list[Row], replaced: Array) -> list[Group]:
@@ -151,10 +138,8 @@ def groups(rows: list[Row], replaced: Array) -> list[Group]:
 
 
 def breaks(rows: list[Row], replaced: Array) -> Array:
-    """(K,) the blocks before which something else than a chord stands, ascending.
-
-    replaced : (R,) True for rows that chords replace
-    """
+    """(K,) the blocks before which something else than a chord stands, ascending; chords replace the rows
+    `replaced` (R,)."""
     found: set[int] = set()
     for row, chords in zip(rows, replaced.tolist(), strict=True):
         switches = any(word.letter in "SMT" for word in row.words)
@@ -174,10 +159,8 @@ def off_the_path(line: Polyline, plan: Plan, groups: Sequence[Group]) -> float:
     moves = moves[(moves >= 0) & (moves < len(line.block))]
     start, step = line.points[moves], line.points[moves + 1] - line.points[moves]
     segment = np.minimum(np.searchsorted(toolpath.block, line.block[moves]), len(toolpath) - 1)
-    worst = 0.0
-    for place in np.linspace(0.0, 1.0, PLACES):
-        worst = max(worst, float(distance_near(toolpath, start + place * step, segment).max(initial=0.0)))
-    return worst
+    places = (start + share * step for share in np.linspace(0.0, 1.0, PLACES))
+    return max(float(distance_near(toolpath, place, segment).max(initial=0.0)) for place in places)
 
 
 def _rounded(points: FloatArray) -> FloatArray:
@@ -191,8 +174,7 @@ def _fixed(plan: Plan, trajectory: Trajectory, breaks: Array) -> Array:
     and end, and the last before each of the breaks."""
     fixed = np.zeros(len(trajectory), dtype=bool)
     fixed[[0, -1]] = True
-    at_rest = trajectory.feed <= 1e-9 * max(float(trajectory.feed.max()), 1e-9)
-    fixed |= at_rest
+    fixed |= trajectory.feed <= 1e-9 * max(float(trajectory.feed.max()), 1e-9)
     back = (trajectory.velocity[1:] * trajectory.velocity[:-1]).sum(axis=1) < 0.0
     fixed[1:] |= back
     fixed[:-1] |= back

@@ -1,13 +1,11 @@
-"""The tables of grbl, Klipper, Marlin and LinuxCNC: the words of each, and how each is told what it has no
-word for.
+"""The tables of grbl, Klipper, Marlin and LinuxCNC: the words of each; one that stands in no table is
+refused.
 
-A word that stands in no table is refused with its line. Where the tables come from:
-
-    grbl      1.1h: gcode.c (gc_execute_line), protocol.c, wiki "Grbl v1.1 Commands", "Grbl v1.1 Laser Mode"
-    Klipper   docs/G-Codes.md, klippy/gcode.py, klippy/extras/gcode_move.py, homing.py
-    Marlin    2.1: marlinfw.org/meta/gcode, src/gcode/gcode.cpp, parser.cpp, queue.cpp, as Configuration.h comes: without
-              CNC_COORDINATE_SYSTEMS, CNC_WORKSPACE_PLANES, INCH_MODE_SUPPORT, PAREN_COMMENTS
-    LinuxCNC  2.9: docs/src/gcode/g-code.adoc, m-code.adoc, overview.adoc
+grbl      1.1h: gcode.c (gc_execute_line), protocol.c, wiki "Grbl v1.1 Commands", "Grbl v1.1 Laser Mode"
+Klipper   docs/G-Codes.md, klippy/gcode.py, klippy/extras/gcode_move.py, homing.py
+Marlin    2.1: marlinfw.org/meta/gcode, src/gcode/gcode.cpp, parser.cpp, queue.cpp, as Configuration.h comes: without
+          CNC_COORDINATE_SYSTEMS, CNC_WORKSPACE_PLANES, INCH_MODE_SUPPORT, PAREN_COMMENTS
+LinuxCNC  2.9: docs/src/gcode/g-code.adoc, m-code.adoc, overview.adoc
 """
 
 import re
@@ -19,12 +17,9 @@ from planner.nc.reading import ABSOLUTE, Reading
 from planner.nc.settings import EVERYTHING
 
 _STAYS = "this control always stays on the path"
-_ONE_ZERO = "this control has no work offsets: its zero is the program's"
 _STRAIGHT = "what it would choose is written out as straight moves"
-_RPM = "S is in revolutions per minute there anyway"
-_OPERATOR = "what the operator may override is this control's own"
-_NOT_USED = "the control has no such mode"
 _ALL_OFF = "this control does not look at its words, and would let go of all motors at once"
+_NOT_USED = "the control has no such mode"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,16 +27,13 @@ class Control:
     """A control's words. Codes are in tenths: G61.1 is 611."""
 
     name: str
-    # g and m: codes that mean there what they mean in RS274NGC
-    g: frozenset[int]
+    g: frozenset[int]  # codes that mean there what they mean in RS274NGC
     m: frozenset[int]
-    # arcs and cycles: it is given arcs, and everything that moves besides G0 to G3, as the program has them;
-    # else as straight moves
-    arcs: bool = False
-    cycles: bool = False
+    arcs: bool = False  # it is given arcs as the program has them, else as straight moves
+    cycles: bool = False  # the same of everything that moves besides G0 to G3
     settings: frozenset[int] = frozenset()  # M numbers that it knows beside those, kept with all their words
-    # codes ("G64") that change nothing of what it does, and why
-    idle: dict[str, str] = field(default_factory=dict)
+    commands: str = ""  # pattern of lines that are no words: homing, unlocking, messages, commands of its own
+    idle: dict[str, str] = field(default_factory=dict)  # codes ("G64") that change nothing there, and why
     instead: dict[str, str] = field(default_factory=dict)  # M codes ("M6"), and what is written for them
     # settings ("M84") that mean more where it does not look at words of these letters, and why they are then
     # left out; "" where they are refused
@@ -52,10 +44,9 @@ class Control:
     milliseconds: bool = False  # P of G4 counts them
     inch: bool = True  # it knows G20
     speed_by_code: bool = False  # S stands beside M3 and M4 only
-    # number, percent and paren: lines may begin with N, hold %, hold comments in parentheses
-    number: bool = True
-    percent: bool = False
-    paren: bool = True
+    number: bool = True  # lines may begin with N
+    percent: bool = False  # they may hold %
+    paren: bool = True  # and comments in parentheses
     line_max: int = 0  # longest line without blanks and comments; 0 for no limit
     end: str = "M2"  # the last line of a program that has none, or whose M2 or M30 it does not know
 
@@ -64,27 +55,43 @@ class Control:
         """Whether its E is an extruder's."""
         return self.one_command and "E" in self.letters
 
+    def is_command(self, line: str) -> bool:
+        """Whether it knows a line that is no words."""
+        return bool(self.commands) and re.fullmatch(self.commands, line, re.IGNORECASE) is not None
+
 
 _IDLE_ON_MILLS = {
     "G8": _NOT_USED,
-    "G97": _RPM,
-    "M48": _OPERATOR,
-    "M49": _OPERATOR,
-    "G64": _STAYS,
-    "G61.1": _STAYS,
+    "G97": "S is in revolutions per minute there anyway",
+    **dict.fromkeys(("M48", "M49"), "what the operator may override is this control's own"),
+    **dict.fromkeys(("G64", "G61.1"), _STAYS),
 }
 _IDLE_ON_PRINTERS = {
     **_IDLE_ON_MILLS,
     **dict.fromkeys(("G17", "G18", "G19", "G80", "G91.1", "G98", "G99"), _STRAIGHT),
+    **dict.fromkeys(("G40", "G49"), _NOT_USED),
     "G61": _STAYS,
-    "G54": _ONE_ZERO,
-    "G40": _NOT_USED,
-    "G49": _NOT_USED,
+    "G54": "this control has no work offsets: its zero is the program's",
     "G94": "F is always per minute there",
 }
-_PRINTER = frozenset(
-    (17, 18, 82, 83, 84, 104, 105, 106, 107, 109, 114, 115, 117, 118, 119, 140, 190, 204, 220, 221, 400)
-)
+_PRINTER = {
+    17,
+    18,
+    82,
+    83,
+    84,
+    *range(104, 108),
+    109,
+    114,
+    115,
+    *range(117, 120),
+    140,
+    190,
+    204,
+    220,
+    221,
+    400,
+}
 
 GRBL = Control(
     name="grbl",
@@ -93,6 +100,7 @@ GRBL = Control(
         610, 800, 900, 910, 911, 920, 921, 930, 940,
     )),
     m=frozenset((0, 1, 2, 30, 3, 4, 5, 7, 8, 9)),
+    commands=r"\$[HX]",
     arcs=True,
     idle={**_IDLE_ON_MILLS, "G98": _STRAIGHT, "G99": _STRAIGHT},
     instead={"M6": "M0", "M60": "M0"},
@@ -103,13 +111,14 @@ KLIPPER = Control(
     name="klipper",
     g=frozenset((0, 10, 40, 210, 280, 900, 910, 920)),
     m=frozenset(),
-    settings=_PRINTER - {17} | {73, 110, 112} | set(range(20, 28)),
+    settings=frozenset(_PRINTER - {17} | {73, 110, 112, *range(20, 28)}),
+    commands=r"G28[XYZ\s]*0*|M11[78]\b.*|SET_VELOCITY_LIMIT\b.*",
     idle={**_IDLE_ON_PRINTERS, "M17": "motors are on from their first move"},
     unheard={
         **dict.fromkeys(("M18", "M84"), (EVERYTHING, _ALL_OFF)),  # klippy/extras/stepper_enable.py
         **dict.fromkeys(("M109", "M190"), ("R", "")),  # without S it would switch the heater off
     },
-    instead={"M0": "PAUSE", "M1": "PAUSE", "M60": "PAUSE", "M6": "PAUSE"},
+    instead=dict.fromkeys(("M0", "M1", "M60", "M6"), "PAUSE"),
     letters="FXYZE",
     one_command=True,
     rapid_feed=True,
@@ -125,7 +134,10 @@ MARLIN = replace(
     m=frozenset((0, 1, 3, 4, 5, 7, 8, 9)),
     idle=_IDLE_ON_PRINTERS,
     unheard={},
-    settings=_PRINTER | {73, 75, 76, 77, 85, 110, 111, 112, 113, 155, 201, 203, 205, 301, 302, 420, 851, 900},
+    commands=r"G28[XYZ\s]*0*|M11[78]\b.*",
+    settings=frozenset(
+        _PRINTER | {73, 75, 76, 77, 85, *range(110, 114), 155, 201, 203, 205, 301, 302, 420, 851, 900}
+    ),
     instead={"M60": "M0", "M6": "M0"},
     number=False,  # a line number needs a checksum on the serial line
 )
@@ -141,18 +153,6 @@ LINUXCNC = Control(
     percent=True,
     line_max=255,
 )
-# Lines that are no words, by control: homing, unlocking, messages, Klipper's own commands.
-_COMMANDS = {
-    "grbl": re.compile(r"\$[HX]", re.IGNORECASE),
-    "klipper": re.compile(r"G28[XYZ\s]*0*|M11[78]\b.*|SET_VELOCITY_LIMIT\b.*", re.IGNORECASE),
-    "marlin": re.compile(r"G28[XYZ\s]*0*|M11[78]\b.*", re.IGNORECASE),
-}
-
-
-def is_command(line: str, control: Control) -> bool:
-    """Whether a line that is no words is one that the control knows."""
-    known = _COMMANDS.get(control.name)
-    return known is not None and known.fullmatch(line) is not None
 
 
 def is_setting(words: list[Word], control: Control) -> bool:
@@ -167,36 +167,31 @@ def is_setting(words: list[Word], control: Control) -> bool:
 
 
 def sets_tools(row: Row) -> bool:
-    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z: grbl knows
-    neither."""
-    kind = row.value("L")
+    """Whether G10 or G43.1 say what grbl lacks: more than an origin (L1, L10, L11; R), or a length in Z."""
+    kind, g = row.value("L"), row.g()
     more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
-    lengths = 431 in row.g() and (row.value("X") is not None or row.value("Y") is not None)
-    return (G10 in row.g() and more) or lengths
+    return (G10 in g and more) or (431 in g and (row.value("X") or row.value("Y")) is not None)
 
 
 def takes_move(row: Row, control: Control, reading: Reading) -> bool:
-    """Whether the control is given a move in the program's own words: no arcs with turns for grbl, none with
-    absolute centres."""
+    """Whether the control is given a move in the program's own words."""
     if row.radius and not control.cycles:
         return False
-    if row.motion in codes.ARCS:
+    if row.motion in codes.ARCS:  # grbl knows none with turns, and nobody's centres are absolute
         known = control.arcs and reading.arc_centres != ABSOLUTE
         return known and (control.cycles or row.value("P") is None)
     return row.motion <= 30 or (control.cycles and row.motion in control.g)
 
 
 CONTROLS = {control.name: control for control in (GRBL, KLIPPER, MARLIN, LINUXCNC)}
-# Codes that mean the same on every control, but that need a build of it with an option: what is said of them.
+# What is said of codes that need a control built with an option.
 OPTIONS = {
     ("grbl", "M7"): "M7 needs a grbl built with ENABLE_M7",
     ("klipper", "PAUSE"): "PAUSE needs [pause_resume] in printer.cfg",
     ("marlin", "M3"): "M3, M4 and M5 need a Marlin built with SPINDLE_FEATURE or LASER_FEATURE",
     ("marlin", "M420"): "M420 needs a Marlin built with bed leveling",
     ("marlin", "M900"): "M900 needs a Marlin built with LIN_ADVANCE",
-    **{
-        ("marlin", f"M{code}"): "M7, M8 and M9 need a Marlin built with COOLANT_CONTROL" for code in (7, 8, 9)
-    },
-    **{("klipper", code): "G10 and G11 need [firmware_retraction] in printer.cfg" for code in ("G10", "G11")},
-    **{("marlin", code): "G10 and G11 need a Marlin built with FWRETRACT" for code in ("G10", "G11")},
+    **{("marlin", m): "M7, M8 and M9 need a Marlin built with COOLANT_CONTROL" for m in ("M7", "M8", "M9")},
+    **{("klipper", g): "G10 and G11 need [firmware_retraction] in printer.cfg" for g in ("G10", "G11")},
+    **{("marlin", g): "G10 and G11 need a Marlin built with FWRETRACT" for g in ("G10", "G11")},
 }

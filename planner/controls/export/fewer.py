@@ -62,10 +62,8 @@ def fewer_lines(
             raise InputError(f"the program cannot be written with fewer lines: {why}", source=program.source)
     found = _Writer(data, program, machine, within, arcs=arcs).written()
     if found.after == found.before:
-        said = "; ".join(
-            f"{why}: {count:,} line{'s' * (count > 1)}, first {line}"
-            for why, (count, line) in found.kept.items()
-        )
+        many = [f"{why}: {n:,} line{'s' * (n > 1)}, first {line}" for why, (n, line) in found.kept.items()]
+        said = "; ".join(many)
         text = f"no line can go within {plain(round(within, 6))} mm{': ' * bool(said)}{said}"
         raise InputError(text, source=program.source)
     return found
@@ -78,9 +76,8 @@ class _Writer:
         self.program, self.within = program, within
         self.rows = rows_of(data, program, machine).rows
         self.lines: list[bytes | None] = [*data.split(b"\n")]
-        absolute = program.reading.arc_centres == ABSOLUTE or any(
-            "arc centres read as absolute" in note for note in program.assumptions
-        )
+        told = any("arc centres read as absolute" in note for note in program.assumptions)
+        absolute = program.reading.arc_centres == ABSOLUTE or told
         self.arcs = arcs and not absolute and not any(901 in row.g() for row in self.rows)
         self.place = np.vstack([program.start, program.end])[:, : len(LINEAR)]
 
@@ -89,9 +86,16 @@ class _Writer:
         kept: dict[str, tuple[int, int]] = {}
         run: list[Row] = []
         before = after = arcs = 0
+        feed = self.program.feed
+
+        def goes_on(last: Row, row: Row) -> bool:
+            """Whether it is directly behind another, under the same F."""
+            behind = row.line == last.line + 1 and row.first == last.last
+            return behind and feed[row.first] == feed[last.first]
+
         for row in [*self.rows, None]:
             why = None if row is None else self._why_kept(row)
-            if run and (why != "" or row is None or not self._goes_on(run[-1], row)):
+            if run and (why != "" or row is None or not goes_on(run[-1], row)):
                 moves, bent = self._replace(run)
                 after, arcs, run = after + moves, arcs + bent, []
             if row is None:
@@ -112,6 +116,7 @@ class _Writer:
         if not row.moves and not (row.text and row.last > row.first):
             return None
         program, first = self.program, row.first
+        alone = _ALONE.fullmatch(self.lines[row.line - 1] or b"")
         for holds, why in (
             (row.text, "commands of the control"),
             (row.radius, "cutter radius compensation (G41, G42)"),
@@ -123,22 +128,11 @@ class _Writer:
             (not row.per_minute, "feed per revolution or inverse time (G93, G95)"),
             (program.path_control[first] != PathControl.BLEND, "exact path or exact stop (G61, G61.1)"),
             (not row.plain, "coordinates that the program has turned, or not told before"),
-            (
-                row.others or set(row.g()) - {LINE} or not self._alone(row),
-                "other words or a comment beside them",
-            ),
+            (row.others or set(row.g()) - {LINE} or not alone, "other words or a comment beside them"),
         ):
             if holds:
                 return None if row.motion == 0 else why
         return None if row.motion == 0 or program.kind[first] != Kind.LINE else ""
-
-    def _alone(self, row: Row) -> bool:
-        return _ALONE.fullmatch(self.lines[row.line - 1] or b"") is not None
-
-    def _goes_on(self, last: Row, row: Row) -> bool:
-        """Whether a line is directly behind another, under the same F."""
-        feed = self.program.feed
-        return row.line == last.line + 1 and row.first == last.last and feed[row.first] == feed[last.first]
 
     def _replace(self, run: list[Row]) -> tuple[int, int]:
         """Write a run anew; returns the numbers of its moves and of its arcs."""

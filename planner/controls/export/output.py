@@ -1,7 +1,6 @@
-"""The program written for a control so far, and what it has in force there.
-
-G90, G91, the motion code and F are said again wherever straight moves have changed them. S waits for the line
-that it belongs to: grbl empties its buffer at an S on a line of its own.
+"""The program written for a control so far, and what it has in force there: G90, G91, the motion code and F
+are said again wherever straight moves have changed them. S waits for the line that it belongs to: grbl
+empties its buffer at an S on a line of its own.
 """
 
 import re
@@ -27,29 +26,20 @@ _LENGTHS = frozenset("XYZIJKRUVWQE")
 
 
 class Output:
-    """The lines of a file, and the state of the control after them.
-
-    lines, notes : so far; notes by what they are about, each once, with its line
-    motion       : the motion code, "" for none that lines could leave out
-    absolute, inch : G90, G20
-    feed         : F per minute in force, None for none
-    programmed_feed, feed_inch : the program's last F word, and whether it was given in inches
-    speed        : an S word that waits for its line
-    spindle      : 3 or 4 after M3 and M4, 0 after M5
-    extrudes     : E words move an extruder of the control
-    """
+    """The lines of a file, and the state of the control after them."""
 
     def __init__(self, source: Source, control: Control, machine: Machine):
         self.source, self.control, self.machine = source, control, machine
         self.program = source.program
         self.lines: list[str] = []
-        self.notes: dict[str, tuple[str, int]] = {}
-        self.motion, self.absolute, self.inch = "", True, False
-        self.feed: float | None = None
-        self.programmed_feed: Word | None = None
-        self.feed_inch = False
-        self.speed: Word | None = None
-        self.spindle = 0
+        self.notes: dict[str, tuple[str, int]] = {}  # by what they are about, each once, with its line
+        self.motion = ""  # the motion code, "" for none that lines could leave out
+        self.absolute, self.inch = True, False  # G90, G20
+        self.feed: float | None = None  # F per minute in force
+        self.programmed_feed: Word | None = None  # the program's last F word ...
+        self.feed_inch = False  # ... and whether it was given in inches
+        self.speed: Word | None = None  # an S word that waits for its line
+        self.spindle = 0  # 3 or 4 after M3 and M4, 0 after M5
         self.extrudes = control.extruder and any(row.feeds for row in source.rows)
 
     def _say_move(self, row: Row, distance: list[str], words: list[str]) -> None:
@@ -67,15 +57,11 @@ class Output:
 
     def _flush_speed(self) -> None:
         """Say the speed on a line of its own, before what does not take it."""
-        if self.speed is None:
+        if self.speed is None or (self.control.speed_by_code and not self.spindle):
             return
-        if self.control.speed_by_code:
-            if not self.spindle:
-                return
-            macro = self.machine.macros.get(f"M{self.spindle}")
-            self._say(f"M{self.spindle} {self.speed}" if macro is None else called(macro, [self.speed]))
-        else:
-            self._say(str(self.speed))
+        turning = f"M{self.spindle} {self.speed}" if self.control.speed_by_code else str(self.speed)
+        macro = self.machine.macros.get(f"M{self.spindle}") if self.control.speed_by_code else None
+        self._say(turning if macro is None else called(macro, [self.speed]))
         self.speed = None
 
     def _distance(self, *, absolute: bool) -> list[str]:
@@ -166,8 +152,7 @@ def head_of(source: Source, control: Control, plan: Plan, tolerance: float, what
 
 
 def assumptions(source: Source, *, as_it_is: bool = False) -> list[str]:
-    """The assumptions on coordinates and start, in words; `as_it_is` where all lines are the program's
-    own."""
+    """The assumptions on coordinates and start; `as_it_is` where all lines are the program's own."""
     program = source.program
     used = sorted({code for row in source.rows for code in row.g() if codes.G_GROUP[code] == "work offset"})
     system = " ".join(system_name(code) for code in used) or "the work offset in force"
@@ -183,8 +168,7 @@ def assumptions(source: Source, *, as_it_is: bool = False) -> list[str]:
 
 
 def _modes(source: Source, control: Control) -> list[str]:
-    """Units, plane, distance and feed mode, as far as no line says them before or beside the first that
-    moves."""
+    """Units, plane, distance and feed mode, as far as no line says them up to the first that moves."""
     said: set[str] = set()
     for row in source.rows:
         said |= {codes.G_GROUP[code] for code in row.g() if code in control.g}

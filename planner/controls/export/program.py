@@ -4,36 +4,25 @@ if that is faster.
 grbl, Klipper and Marlin stay on the path and slow down at its corners, so a smooth path inside the tolerance
 can let them go faster, with F words that keep the axes within their limits in its bends; how far apart its
 points should be depends on how they look ahead and on the time of a line. Their times are predicted by short
-models (models.py), for the program as it is and for the planned path with chords of several widths (`SHARES`
-of what is allowed); the fastest is written. LinuxCNC rounds corners itself and has a model and candidates of
-its own (candidates.py); benchmarks/results/controls.md says how they did.
+models (controls/timing), for the program as it is and for the planned path with chords of several widths; the
+fastest is written (candidates.py). LinuxCNC rounds corners itself; benchmarks/results/controls.md says how
+they did.
 
 Plan and chords share the tolerance: what the verdict found of the plan's errors, the chords, and the corners
 of LinuxCNC add up to it at most. A plan that uses all of it leaves no room; one with a tenth less does.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from planner.base.errors import InputError
-from planner.controls.export.candidates import (
-    AS_IT_IS,
-    Candidate,
-    Candidates,
-    best_first,
-    linuxcnc_candidates,
-)
+from planner.controls.export.candidates import Candidate, Candidates, best_first, candidates
 from planner.controls.export.controls import CONTROLS, LINUXCNC
 from planner.controls.export.output import FIRST_RUN, assumptions
-from planner.controls.timing.models import CONTROLS as MODELS
-from planner.controls.timing.models import predicted_times
-from planner.controls.timing.times import feed_in_force, standing
 from planner.planning.job.plan import Plan
 
-# Of the room for chords: wider ones need fewer lines, narrower ones turn less at each.
-SHARES = (1.0, 0.5, 0.25, 0.1)
 NO_JERK = "has no limit of the jerk, which the plan keeps: so it can be faster than the plan"
 
 
@@ -43,8 +32,8 @@ class Exported:
 
     file: str  # its name
     sentence: str  # what it holds
-    # predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with a path mode of
-    # its own
+    # predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with its own path
+    # mode
     predicted: dict[str, float]
     assumptions: tuple[str, ...] = ()  # where coordinates and start are, and how a first run goes
     # what was left out or written another way, what the control needs, and what would leave the chords more
@@ -69,19 +58,21 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
             source=plan.program.source,
         )
     job = Candidates(plan, CONTROLS[control], tolerance)
-    linuxcnc = control == LINUXCNC.name
-    found = linuxcnc_candidates(job) if linuxcnc else _candidates(job)
-    order = best_first(found) if linuxcnc else sorted(found, key=lambda one: one.time)
-    chosen, data, notes = _first_written(job, order)
-    file = f"{control}.ngc" if linuxcnc else f"{control}.gcode"
+    found = candidates(job)
+    chosen, data, notes = _first_written(job, best_first(job, found))
+    file = f"{control}.ngc" if control == LINUXCNC.name else f"{control}.gcode"
     (directory / file).write_bytes(data)
     if chosen.replaced is not None and job.why_not:
         notes = (f"the program as it is is no {control} program: {job.why_not}", *notes)
     if len(found) > 1 or job.room is None:
         notes = (*notes, *job.room_notes())
+    if chosen.replaced is None:
+        sentence = f"{chosen.name}, byte for byte" + f" behind a line G21 {chosen.mode}" * bool(chosen.mode)
+    else:
+        sentence = ", ".join(filter(None, (chosen.name, f"{len(chosen.line.feed):,} moves", chosen.mode)))
     return Exported(
         file=file,
-        sentence=_sentence(chosen),
+        sentence=sentence,
         predicted={one.name: one.time for one in found if np.isfinite(one.time)},
         assumptions=(*assumptions(job.source, as_it_is=chosen.replaced is None), FIRST_RUN),
         notes=notes,
@@ -98,29 +89,3 @@ def _first_written(job: Candidates, order: list[Candidate]) -> tuple[Candidate, 
             refused = refused or fault
     assert refused is not None
     raise refused
-
-
-def _sentence(chosen: Candidate) -> str:
-    if chosen.replaced is None:
-        return f"{chosen.name}, byte for byte" + (f" behind a line G21 {chosen.mode}" if chosen.mode else "")
-    return ", ".join(part for part in (chosen.name, f"{len(chosen.line.feed):,} moves", chosen.mode) if part)
-
-
-def _candidates(job: Candidates) -> list[Candidate]:
-    """For controls that stay on the path."""
-    room = job.room
-    found = [one for share in SHARES if room is not None for one in job.chords(share * room)]
-    found += job.own(room or job.tolerance)
-    return [replace(one, time=_predicted(job, one)) for one in found]
-
-
-def _predicted(job: Candidates, one: Candidate) -> float:
-    """Time that the control takes for a candidate, dwells included [s]."""
-    plan, line = job.plan, one.line
-    feed = np.where(line.rapid, np.inf, line.feed)
-    if one.name == AS_IT_IS and job.control.rapid_feed:
-        feed = np.where(line.rapid, feed_in_force(plan.program, job.text or b"")[line.block], feed)
-    stands = standing(plan.program, line.block, switches=job.control.name != "klipper")
-    model = MODELS[job.control.name]
-    moving = predicted_times(line.points, feed, stands, plan.machine, plan.toolpath.axes, model)
-    return float(moving.sum()) + float(plan.toolpath.dwell.sum())

@@ -67,37 +67,30 @@ class Word:
 class Row:
     """A line of a program with at least one word.
 
-    line     : 1-based
     words    : those of RS274NGC's moves, modes and switches; line numbers are left out
     others   : codes of other kinds, each with the words that are its own: settings, names, messages, what the
                user leaves out
-    text     : the line without its comments and number, where it is no words: homing, commands to the
-               control; "" otherwise
-    first, last : its blocks are those from `first` to before `last`
-    motion   : motion code in tenths that its coordinates belong to; -1 for none
+    text     : the line without its comments and number, where it is no words: homing, commands to the control
     absolute, inch, per_minute : G90, G20 and G94 are in force at its end
-    inch_before : G20 was in force before it, which its F word is read in
-    plane    : letters of the axes of arcs
-    radius   : cutter radius compensation acts on it, or ends with it
-    placed   : letters of axes whose place the program's words have told before it
-    plain    : chords may replace what it moves
     """
 
-    line: int
+    line: int  # 1-based
     words: list[Word]
     others: list[list[Word]]
     text: str
-    first: int
-    last: int
-    motion: int = -1
+    first: int  # its blocks are those from here ...
+    last: int  # ... to before here
+    motion: int = -1  # motion code in tenths that its coordinates belong to; -1 for none
     absolute: bool = True
     inch: bool = False
-    inch_before: bool = False
+    inch_before: bool = False  # G20 was in force before it, which its F word is read in
     per_minute: bool = True
-    plane: str = "XY"
-    radius: bool = False
-    placed: frozenset[str] = frozenset()
-    plain: bool = False
+    plane: str = "XY"  # letters of the axes of arcs
+    radius: bool = False  # cutter radius compensation acts on it, or ends with it
+    placed: frozenset[str] = (
+        frozenset()
+    )  # letters of axes whose place the program's words have told before it
+    plain: bool = False  # chords may replace what it moves
 
     def g(self) -> list[int]:
         """Its G codes in tenths."""
@@ -119,9 +112,8 @@ class Row:
     @property
     def feeds(self) -> bool:
         """Whether its E is an extruder's: not that of G76 and of M66 to M68."""
-        return self.value("E") is not None and not any(
-            "E" in codes.WORDS.get((word.letter, word.code), "") for word in self.words
-        )
+        own = any("E" in codes.WORDS.get((word.letter, word.code), "") for word in self.words)
+        return self.value("E") is not None and not own
 
     @property
     def moves(self) -> bool:
@@ -176,9 +168,8 @@ def _rows(words: Words, applied: Words, program: Program) -> list[Row]:
         if others and others[0][0].letter == "M" and others[0][0].code // 10 in TEXTS:
             others, text = [], _text(words, first[r])
         rows.append(Row(line, [] if text else mine, [] if text else others, text, begin[r], end[r]))
-        if (begun and found and found[0].letter == "%") or not {
-            word.code for word in mine if word.letter == "M"
-        }.isdisjoint(ENDS):
+        ends = any(word.letter == "M" and word.code in ENDS for word in mine)
+        if ends or (begun and found and found[0].letter == "%"):
             break
         begun = True
     return rows
@@ -204,8 +195,7 @@ def _text(words: Words, word: int) -> str:
 
 
 def _parted(words: list[Word], ignored: frozenset[str]) -> tuple[list[Word], list[list[Word]]]:
-    """The words of moves, modes and switches; and the others, each code with the words behind it that are its
-    own."""
+    """The words of moves, modes and switches; and the others, each code with its own words behind it."""
     letters = "".join(word.letter for word in words)
     mine: list[Word] = []
     others: list[list[Word]] = []
@@ -246,11 +236,9 @@ class _Follower:
         self.simple = np.isin(program.kind, MOVES)
         self.simple[program.synchronised] = False
         before = np.vstack([program.start, program.end])
-        self.turns = {
-            letter.upper(): np.diff(before[:, k]) != 0.0
-            for k, letter in enumerate(program.axes)
-            if letter.upper() not in LINEAR
-        }
+        step = np.diff(before, axis=0) != 0.0
+        letters = enumerate(map(str.upper, program.axes))
+        self.turns = {letter: step[:, k] for k, letter in letters if letter not in LINEAR}
 
     def follow(self, rows: list[Row]) -> None:
         """Fill in the rows."""
@@ -301,19 +289,19 @@ class _Follower:
         elif one_shot == G53:
             row.motion = self.motion
             self.placed -= named
-        elif (
-            one_shot == -1
-            and LENGTHS.isdisjoint(g)
-            and (named or row.feeds or (self.motion in codes.ARCS and _is_arc(row, g)))
-        ):
+        elif one_shot == -1 and LENGTHS.isdisjoint(g) and (named or row.feeds or self._turns_round(row, g)):
             row.motion = self.motion
             if row.moves:
                 row.plain = self._is_plain(row, named)
             self.placed |= self._told(row, named) if self.absolute else frozenset()
 
+    def _turns_round(self, row: Row, g: list[int]) -> bool:
+        """Whether it is a full circle, which needs no coordinate."""
+        said = not codes.ARCS.isdisjoint(g) or any(word.letter in "IJKR" for word in row.words)
+        return self.motion in codes.ARCS and said
+
     def _told(self, row: Row, named: frozenset[str]) -> frozenset[str]:
-        """Axes of which the words of a row tell where they are after it: a cycle's depth does not, the tool
-        comes back."""
+        """Axes of which a row's words tell where they are after it: not a cycle's depth, it comes back."""
         if row.motion <= 30 or row.motion in codes.SPLINES:
             return named
         return named & frozenset(row.plane) if row.motion in codes.CYCLES else frozenset()
@@ -337,8 +325,3 @@ class _Follower:
             and (self.absolute or not self.extrudes)  # G90 and G91 between chords would change what E is
             and self.ignored.isdisjoint(named)
         )
-
-
-def _is_arc(row: Row, g: list[int]) -> bool:
-    """Whether a row under G2 or G3 is a full circle, which needs no coordinate."""
-    return not codes.ARCS.isdisjoint(g) or any(word.letter in "IJKR" for word in row.words)

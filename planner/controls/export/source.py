@@ -1,5 +1,4 @@
-"""The text of a plan's program whose lines an export goes by: its own, the expanded one, or one that is
-written for it."""
+"""The text of a plan's program that an export goes by: its own, the expanded one, or one written for it."""
 
 import dataclasses
 import re
@@ -9,7 +8,7 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.controls.export.chords import DECIMALS
-from planner.controls.export.controls import Control, is_command, is_setting, sets_tools, takes_move
+from planner.controls.export.controls import Control, is_setting, sets_tools, takes_move
 from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, rows_of
 from planner.machine import Machine
 from planner.nc import codes
@@ -32,10 +31,8 @@ def text_of(program: Program) -> bytes | None:
 
 
 def source_of(plan: Plan) -> Source:
-    """The rows that an export of the plan goes by; they read as its blocks, one by one.
-
-    Raises InputError if the text has changed since it was planned, or cannot be written out.
-    """
+    """The rows that an export of the plan goes by, which read as its blocks. Raises InputError if the text
+    has changed since it was planned, or cannot be written out."""
     program, text = plan.program, text_of(plan.program)
     if program.reading.caps is not None:
         raise InputError(
@@ -43,9 +40,9 @@ def source_of(plan: Plan) -> Source:
             "which has the caps as F words, and export that",
             source=program.source,
         )
-    if text is None and not program.pen:
-        return rows_of(*_of_points(program), plan.machine)
     if text is None:
+        if not program.pen:
+            return rows_of(*_of_points(program), plan.machine)
         feeds = np.where(np.isfinite(program.feed), program.feed, FEED_MIN)
         return _read(program_text(program, feeds, 1.0).encode(), plan, "as an NC program")
     if program.expansion is None:
@@ -80,19 +77,13 @@ def _same(text: bytes, plan: Plan, reading: Reading, how: str) -> Program:
 
 def same_places(one: Program, other: Program) -> bool:
     """Whether two programs have the same kinds of blocks with the same ends."""
-    return (
-        one.end.shape == other.end.shape
-        and np.array_equal(one.kind, other.kind)
-        and np.allclose(one.end, other.end, rtol=0.0, atol=SAME_PLACE)
-    )
+    same = one.end.shape == other.end.shape and np.array_equal(one.kind, other.kind)
+    return same and np.allclose(one.end, other.end, rtol=0.0, atol=SAME_PLACE)
 
 
 def _of_points(program: Program) -> tuple[bytes, Program]:
     """A path of points as text, and the program with the lines of it: a rapid to where it begins, which is no
-    block, then its moves.
-
-    Raises InputError for points of other axes than x, y and z.
-    """
+    block, then its moves. Raises InputError for points of other axes than x, y and z."""
     if len(program.axes) > len("xyz"):
         said = "points of rotary or second axes have no program; export their setpoints"
         raise InputError(said, source=program.source)
@@ -106,10 +97,8 @@ def _of_points(program: Program) -> tuple[bytes, Program]:
 
 
 def _words(place: np.ndarray) -> str:
-    return " ".join(
-        f"{letter}{plain(round(float(value), DECIMALS + 3) + 0.0)}"
-        for letter, value in zip("XYZ", place, strict=False)  # points may have no z
-    )
+    written = (plain(round(float(value), DECIMALS + 3) + 0.0) for value in place)
+    return " ".join(map("".join, zip("XYZ", written, strict=False)))  # points may have no z
 
 
 SAME_FEED = 1e-6  # by its size: what writing a program out rounds
@@ -128,11 +117,8 @@ _NUMBER = re.compile(rb"^\s*N\s*\d", re.MULTILINE | re.IGNORECASE)
 
 
 def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> str:
-    """Why the control cannot be given the program as it is, with the first line; "" if it can.
-
-    source : the rows that are executed: of the text, or of the expanded program
-    text   : the program as it is
-    """
+    """Why the control cannot be given the program as it is, with the first line; "" if it can. `source` are
+    the rows that are executed, of the `text` as it is or of the expanded program."""
     program, linuxcnc = source.program, control.name == LINUXCNC
     if linuxcnc and _reads_otherwise(source, text, machine):
         return "LinuxCNC reads it otherwise than it was planned"
@@ -162,7 +148,7 @@ def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> 
 
 def _row_why_not(row: Row, source: Source, control: Control) -> str:
     if row.text:
-        return "" if is_command(row.text, control) else f"{row.text!r} is no command of this control"
+        return "" if control.is_command(row.text) else f"{row.text!r} is no command of this control"
     for other in row.others:
         name = f"{other[0].letter}{codes.number(other[0].code)}"
         left_out = control.percent and (name[0] == "%" or name in source.program.reading.ignore)
@@ -170,13 +156,10 @@ def _row_why_not(row: Row, source: Source, control: Control) -> str:
             return f"{''.join(map(str, other))} is not known"
     for word in row.words:
         arc = word.code in codes.ARCS and control.name == "marlin"
-        unknown = {
-            "G": word.code not in control.g and not arc,
-            "M": word.code // 10 not in control.m,
-        }.get(word.letter)
-        if unknown:
+        of_code = {"G": word.code in control.g or arc, "M": word.code // 10 in control.m}.get(word.letter)
+        if of_code is False:
             return f"{word} is not known"
-        if unknown is None and not control.one_command and word.letter not in control.letters:
+        if of_code is None and not control.one_command and word.letter not in control.letters:
             return f"{word}: letter {word.letter} is not known"
     if G4 in row.g():
         p = row.value("P")

@@ -28,14 +28,10 @@ _NANOSECONDS = 1e9  # in a second: HAL gives a thread's period in them
 _ROWS_AT_ONCE = SIZES.text_rows
 # mm in a length unit of the streamed positions.
 UNITS = {"mm": 1.0, "inch": MM_PER_INCH}
-FILES = ("setpoints.txt", "stream.hal", "try.hal")
 
 
 def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> None:
-    """Write the three files into an existing directory.
-
-    Raises InputError for another unit than mm or inch.
-    """
+    """Write the three files into an existing directory. Raises InputError for a unit but mm and inch."""
     scale = scale_of(trajectory, unit)
     with (directory / "setpoints.txt").open("w", encoding="ascii") as file:
         file.write(f"# {' '.join(trajectory.axes)} [{unit}, deg], one row every {trajectory.dt:g} s\n")
@@ -47,8 +43,8 @@ def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> N
 
 
 def scale_of(trajectory: Trajectory, unit: str) -> FloatArray:
-    """(A,) units of a file, mm or inch and degrees, per unit of the positions. Raises InputError for another
-    unit."""
+    """(A,) units of a file, mm or inch and degrees, per unit of the positions. Raises InputError for
+    others."""
     if unit not in UNITS:
         raise InputError(f"no unit '{unit}'; there are {', '.join(UNITS)}")
     rotary = [axis in ROTARY_AXES for axis in trajectory.axes]
@@ -61,44 +57,39 @@ def _signals(axes: tuple[str, ...]) -> list[str]:
 
 def _stream_hal(trajectory: Trajectory) -> str:
     axes = trajectory.axes
-    return "\n".join(
-        [
-            f"# Plays the setpoints of a plan: {len(trajectory):,} rows, one in each servo period of {trajectory.dt * 1e3:g} ms.",
-            "# Source this file where the thread of the machine exists (here: servo-thread), and connect the signals to the drives:",
-            f"#     net {axes[0]}-setpoint => hm2_7i96s.0.stepgen.00.position-cmd",
-            "# Move the machine to the first row before. Then:",
-            "#     halcmd setp streamer.0.enable 0;  halstreamer setpoints.txt &   (fills the FIFO)",
-            "#     halcmd setp streamer.0.enable 1                                 (starts the motion)",
-            f"loadrt streamer depth={DEPTH} cfg={'f' * len(axes)}",
-            "setp streamer.0.enable 0",
-            *_signals(axes),
-            "addf streamer.0 servo-thread",
-            "",
-        ]
-    )
+    text = f"""\
+# Plays the setpoints of a plan: {len(trajectory):,} rows, one in each servo period of {trajectory.dt * 1e3:g} ms.
+# Source this file where the thread of the machine exists (here: servo-thread), and connect the signals to the drives:
+#     net {axes[0]}-setpoint => hm2_7i96s.0.stepgen.00.position-cmd
+# Move the machine to the first row before. Then:
+#     halcmd setp streamer.0.enable 0;  halstreamer setpoints.txt &   (fills the FIFO)
+#     halcmd setp streamer.0.enable 1                                 (starts the motion)
+loadrt streamer depth={DEPTH} cfg={"f" * len(axes)}
+setp streamer.0.enable 0
+"""
+    return "\n".join([text.rstrip(), *_signals(axes), "addf streamer.0 servo-thread", ""])
 
 
 def _try_hal(trajectory: Trajectory) -> str:
     axes, rows = trajectory.axes, len(trajectory)
     fill = min(1.0, rows / DEPTH)  # [s], while halstreamer fills the FIFO
-    return "\n".join(
-        [
-            "# Plays the setpoints without a machine and records them, as an ordinary user: halrun -f try.hal",
-            f"# played.txt then has one row per servo period: {' '.join(axes)}, and 1 where the FIFO was empty.",
-            f"loadrt threads name1=servo-thread period1={round(trajectory.dt * _NANOSECONDS)}",
-            f"loadrt streamer depth={DEPTH} cfg={'f' * len(axes)}",
-            f"loadrt sampler depth={2 * DEPTH} cfg={'f' * len(axes)}b",
-            "setp streamer.0.enable 0",
-            *(f"{signal} => sampler.0.pin.{k}" for k, signal in enumerate(_signals(axes))),
-            f"net empty streamer.0.empty => sampler.0.pin.{len(axes)}",
-            "addf streamer.0 servo-thread",
-            "addf sampler.0 servo-thread",
-            "loadusr halstreamer setpoints.txt",
-            f"loadusr -w sleep {fill + 0.5:.1f}",
-            f"loadusr halsampler -n {rows + round(1.0 / trajectory.dt)} played.txt",
-            "setp streamer.0.enable 1",
-            "start",
-            f"loadusr -w sleep {trajectory.cycle_time + 2.0:.1f}",
-            "",
-        ]
-    )
+    signals = [f"{signal} => sampler.0.pin.{k}" for k, signal in enumerate(_signals(axes))]
+    joined = "\n".join(signals)
+    return f"""\
+# Plays the setpoints without a machine and records them, as an ordinary user: halrun -f try.hal
+# played.txt then has one row per servo period: {" ".join(axes)}, and 1 where the FIFO was empty.
+loadrt threads name1=servo-thread period1={round(trajectory.dt * _NANOSECONDS)}
+loadrt streamer depth={DEPTH} cfg={"f" * len(axes)}
+loadrt sampler depth={2 * DEPTH} cfg={"f" * len(axes)}b
+setp streamer.0.enable 0
+{joined}
+net empty streamer.0.empty => sampler.0.pin.{len(axes)}
+addf streamer.0 servo-thread
+addf sampler.0 servo-thread
+loadusr halstreamer setpoints.txt
+loadusr -w sleep {fill + 0.5:.1f}
+loadusr halsampler -n {rows + round(1.0 / trajectory.dt)} played.txt
+setp streamer.0.enable 1
+start
+loadusr -w sleep {trajectory.cycle_time + 2.0:.1f}
+"""

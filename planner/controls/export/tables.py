@@ -41,29 +41,21 @@ _MM_PER_M = 1000.0
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """What a table holds.
+    """What a table holds."""
 
-    kind   : one of `TABLES`
-    unit   : of lengths, mm or inch; rotary axes are in degrees. Of joint trajectories always m and rad
-    within : how far the motion between rows may be from the setpoints [mm], on rotary axes the same number in degrees;
-             None for `WITHIN`, and for any distance where a cycle is given
-    cycle  : time between rows [s]; None for the longest that stays within
-    joints : names of the axes in a joint trajectory; () for their letters
-    power  : (T,) the power of a laser at each setpoint, a column more; None without
-    """
-
-    kind: str = PVT
-    unit: str = "mm"
+    kind: str = PVT  # one of `TABLES`
+    unit: str = "mm"  # of lengths, or inch; rotary axes: degrees. Of joint trajectories always m and rad
+    # how far the motion between rows may be from the setpoints [mm], on rotary axes the same number in
+    # degrees; None for `WITHIN`, and for any distance where a cycle is given
     within: float | None = None
-    cycle: float | None = None
-    joints: tuple[str, ...] = ()
-    power: FloatArray | None = None
+    cycle: float | None = None  # time between rows [s]; None for the longest that stays within
+    joints: tuple[str, ...] = ()  # names of the axes in a joint trajectory; () for their letters
+    power: FloatArray | None = None  # (T,) the power of a laser at each setpoint, a column more
 
 
 def write_table(directory: Path, trajectory: Trajectory, table: Table) -> tuple[int, float]:
-    """Write the files into an existing directory.
-
-    Returns the interpolation periods between two rows, and the largest distance found [mm].
+    """Write the files into an existing directory; returns the interpolation periods between two rows, and the
+    largest distance found [mm].
 
     Raises InputError for another unit than mm or inch, a distance that is not above 0 or that the cycle exceeds, a cycle
     that is no whole number of interpolation periods, and as many names of joints as there are no axes.
@@ -78,7 +70,13 @@ def write_table(directory: Path, trajectory: Trajectory, table: Table) -> tuple[
     if table.cycle is None:
         periods, miss = longest_interval(trajectory, allowed, straight=straight)
     else:
-        periods = _periods(table.cycle, trajectory.dt)
+        dt = trajectory.dt
+        periods = round(table.cycle / dt)
+        if periods < 1 or abs(table.cycle / dt - periods) > _WHOLE:
+            raise InputError(
+                f"--cycle {table.cycle / MILLISECOND:g} ms is no whole number of interpolation periods of {dt / MILLISECOND:g} ms; "
+                "plan with a machine file whose dt divides it"
+            )
         off = _miss(trajectory, _rows(len(trajectory), periods), straight=straight)
         miss = float(off.max(initial=0.0))
         if table.within is not None and (off > allowed).any():
@@ -108,24 +106,12 @@ def write_table(directory: Path, trajectory: Trajectory, table: Table) -> tuple[
     return periods, miss
 
 
-def _periods(cycle: float, dt: float) -> int:
-    """Interpolation periods in a cycle [s]. Raises InputError where that is no whole number."""
-    periods = round(cycle / dt)
-    if periods < 1 or abs(cycle / dt - periods) > _WHOLE:
-        raise InputError(
-            f"--cycle {cycle / MILLISECOND:g} ms is no whole number of interpolation periods of {dt / MILLISECOND:g} ms; plan with "
-            "a machine file whose dt divides it"
-        )
-    return periods
-
-
 def _write_joints(directory: Path, trajectory: Trajectory, rows: Array, joints: tuple[str, ...]) -> None:
     """Write trajectory.json. Raises InputError for another number of names than of axes, or one that comes twice."""
     names = joints or trajectory.axes
     if len(set(names)) != len(trajectory.axes):
-        raise InputError(
-            f"--joints {','.join(names)}; give {len(trajectory.axes)} different names, of {', '.join(trajectory.axes)}"
-        )
+        wanted = f"give {len(trajectory.axes)} different names, of {', '.join(trajectory.axes)}"
+        raise InputError(f"--joints {','.join(names)}; {wanted}")
     rotary = [axis in ROTARY_AXES for axis in trajectory.axes]
     scale = np.where(rotary, 1.0 / trajectory.radius, 1.0 / _MM_PER_M)
     position, velocity = trajectory.position[rows] * scale, trajectory.velocity[rows] * scale
@@ -133,8 +119,9 @@ def _write_joints(directory: Path, trajectory: Trajectory, rows: Array, joints: 
     for t, p, v in zip(trajectory.t[rows].tolist(), position.tolist(), velocity.tolist(), strict=True):
         sec, nanosec = divmod(round(t * _NANOSECONDS), _NANOSECONDS)
         when = {"sec": sec, "nanosec": nanosec}
-        point = {"positions": p, "velocities": v, "accelerations": [], "effort": [], "time_from_start": when}
-        points.append(point)
+        points.append(
+            {"positions": p, "velocities": v, "accelerations": [], "effort": [], "time_from_start": when}
+        )
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     text = json.dumps({"header": header, "joint_names": [*names], "points": points})
     (directory / "trajectory.json").write_text(text + "\n", encoding="utf-8")
@@ -160,21 +147,15 @@ def laser_power(program: Program, trajectory: Trajectory) -> FloatArray:
 def longest_interval(
     trajectory: Trajectory, within: FloatArray, *, straight: bool = False
 ) -> tuple[int, float]:
-    """Interpolation periods between two rows, and by how much the motion between them misses the setpoints at most.
-
-    within   : (A,) allowed miss of each axis [mm, rad]
-    straight : axes move straight from row to row; else on cubics
-
-    Returns the number, at most `PERIODS_MAX`, and the largest miss [mm, rad].
-    """
+    """Interpolation periods between two rows, at most `PERIODS_MAX`, and by how much the motion between them
+    misses the setpoints at most [mm, rad]: on straight moves or cubics, `within` (A,) of them on each
+    axis."""
     found, miss = 1, 0.0
-    periods = 2
-    while periods <= min(PERIODS_MAX, max(len(trajectory) - 1, 1)):
+    while (periods := 2 * found) <= min(PERIODS_MAX, max(len(trajectory) - 1, 1)):
         off = _miss(trajectory, _rows(len(trajectory), periods), straight=straight)
         if (off > within).any():
             break
         found, miss = periods, float(off.max())
-        periods *= 2
     return found, miss
 
 

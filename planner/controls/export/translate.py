@@ -1,8 +1,6 @@
-"""A program in the words of a control: line by line its own, with chords where a line's moves are replaced.
-
-A line gives up to three things, in the order of RS274NGC: what it says before it moves (switches.py), its
-move, and a stop after it. The move is that of the program, word for word, or a run of straight moves in the
-same coordinates.
+"""A program in the words of a control: line by line its own, with chords where a line's moves are replaced. A
+line gives up to three things, in the order of RS274NGC: what it says before it moves (switches.py), its move,
+and a stop.
 """
 
 from collections.abc import Iterator
@@ -29,24 +27,20 @@ FILAMENT_DECIMALS = 5  # of E in mm, as slicers write it
 class Filament:
     """The extruder of a control behind the rows followed so far, by the control's own rules: E is a step after M83 and
     under G91; Marlin's G90 also ends M83. Where E is at the start nothing tells, nor after a tool change or a macro; G92
-    and places do.
-
-    place : what its E is called [mm], NaN where nothing has told it
-    steps : E words are steps, whatever G90 and G91 say of the other axes
-    """
+    and places do."""
 
     def __init__(self, control: Control, machine: Machine):
         self.one_mode = control.name == MARLIN.name  # G90 and G91 set it for E too
         self.macros = machine.macros
-        self.place, self.steps = np.nan, False
+        self.place = np.nan  # what its E is called [mm], NaN where nothing has told it
+        self.steps = False  # E words are steps, whatever G90 and G91 say of the other axes
 
     def shared(self, row: Row, points: FloatArray) -> list[float] | None:
         """The E of a row for each of the chords between points (n+1, 3) [mm], in proportion to their lengths, in
         all the row's own; None where it is a place and the one before is not known, and without a length."""
         word = row.value("E")
         assert word is not None
-        end = _millimetres(word, row)
-        begin = 0.0 if self.steps else self.place
+        end, begin = _millimetres(word, row), 0.0 if self.steps else self.place
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
         if np.isnan(begin) or not along[-1] > 0.0:
             return None
@@ -76,11 +70,8 @@ def _millimetres(word: Word, row: Row) -> float:
 
 
 class Translator(Switches):
-    """Writes a program for a control; `translated` once.
-
-    replaced : (R,) rows of the source whose moves are written as those of `line`
-    rapid    : (n,) speed of each move if it is a rapid one [mm/s]
-    """
+    """Writes a program for a control; `translated` once. The moves of the rows `replaced` (R,) of the source
+    are those of `line`, whose rapid ones have the speeds `rapid` (n,) [mm/s]."""
 
     def __init__(
         self,
@@ -107,12 +98,15 @@ class Translator(Switches):
 
     def _row(self, row: Row, *, chords: bool) -> None:
         if row.text:
-            self._command(row)
+            if not self.control.is_command(row.text):
+                self._refuse(row, row.text)
+            self._say(row.text)
             self._pass(row)
             return
         for other in row.others:
             self._other(row, other)
-        if row.feeds and not self.control.extruder:
+        feeds = row.feeds and self.control.extruder
+        if row.feeds and not feeds:
             word = row.value("E")
             if self.program.reading.extruder != IGNORE:
                 self._refuse(row, f"{word}: an extruder")
@@ -122,12 +116,12 @@ class Translator(Switches):
             self.programmed_feed, self.feed_inch = feed, row.inch_before
         self.speed = row.value("S") or self.speed
         self._switches(row)
-        self._modes(row, chords=chords)
+        self._modes(row)
         if G4 in row.g():
             self._say_dwell(self.source.dwell(row))
         if chords:
             self._chords(row)
-        elif row.named or row.moves or _one_shot(row) >= 0 or (row.feeds and self.control.extruder):
+        elif row.named or row.moves or _one_shot(row) >= 0 or feeds:
             self._move(row)
         self.filament.follow(row)
         self._pass(row)
@@ -135,11 +129,10 @@ class Translator(Switches):
 
     def _move(self, row: Row) -> None:
         """A line of its own that moves, or whose coordinates shift others, word for word."""
-        g = row.g()
         one_shot = _one_shot(row)
         if self.control.name == GRBL.name and sets_tools(row):
             self._refuse(row, "G10 or G43.1 with more than an origin, or a length in Z")
-        if not LENGTHS.isdisjoint(g):
+        if not LENGTHS.isdisjoint(row.g()):
             return  # the coordinates are those of the tool length
         if one_shot == G10 and self.program.reading.dialect == FANUC:
             self._refuse(row, "G10, which other controls read otherwise than Fanuc's")
@@ -150,13 +143,12 @@ class Translator(Switches):
         head, fed = self._head(row, one_shot)
         if head is None:
             return
-        letters = self.control.letters
         used = self._used(row)
         words = []
         for word in row.words:
             if word.letter in "GMFSTN":
                 continue
-            if word.letter in AXES and word.letter not in letters:
+            if word.letter in AXES and word.letter not in self.control.letters:
                 self._parked(row, word)
             elif word.letter in used:
                 words.append(word.letter + self._length(word, row))
@@ -164,8 +156,8 @@ class Translator(Switches):
             words += self._feed_words(row)
         elif row.motion == 0 and self.control.rapid_feed and row.named:
             axes = tuple(c for c in row.named.lower() if c in self.machine.axes)
-            fastest = float(self.machine.limits("velocity", axes).min())
-            words += self._feed_of(fastest * SECONDS_PER_MINUTE, as_is=False)
+            fastest = float(self.machine.limits("velocity", axes).min()) * SECONDS_PER_MINUTE
+            words += self._feed_of(fastest, as_is=False)
         distance = self._distance(absolute=row.absolute) if row.named or row.moves else []
         self._say_move(row, distance, [*head, *words])
         self.motion = self.motion if one_shot < 0 else ""
@@ -212,9 +204,7 @@ class Translator(Switches):
 
     def _parked(self, row: Row, word: Word) -> None:
         """An axis that the control does not have: its words may go where it stands still."""
-        axes = self.program.axes
-        letter = word.letter.lower()
-        if letter in axes:
+        if word.letter.lower() in self.program.axes:
             self._refuse(row, f"{word}: axis {word.letter}")
         if word.letter in self.program.reading.ignore:
             self._refuse(row, f"{word}, which --ignore leaves out of the plan alone")
@@ -223,8 +213,7 @@ class Translator(Switches):
     def _chords(self, row: Row) -> None:
         """The straight moves of the polyline up to the end of the row's blocks, and its dwells."""
         line = self.line
-        unit = MM_PER_INCH if self.inch else 1.0
-        decimals = INCH_DECIMALS if self.inch else DECIMALS
+        unit, decimals = (MM_PER_INCH, INCH_DECIMALS) if self.inch else (1.0, DECIMALS)
         offset = self.program.origins.at(row.first)[0]
         rests = [k for k in range(row.first, row.last) if self.program.kind[k] == Kind.DWELL]
         stop = int(np.searchsorted(line.block, row.last))

@@ -1,18 +1,12 @@
 """From a control's settings to the text of a machine file: every number with its place, and what is assumed
 said aloud.
 
-Jerk. grbl, Klipper, Marlin and LinuxCNC 2.9 know none. A machine file needs one, since a time-optimal motion
+grbl, Klipper, Marlin and LinuxCNC 2.9 know no jerk. A machine file needs one, since a time-optimal motion
 without it would step in acceleration at every switch. It is assumed from the time in which a drive builds up
-its acceleration,
-
-    jerk = acceleration / ramp time
-
-`RAMP_TIME` is that of the built-in mill. A shorter time is right for light and stiff machines, a longer one
-where the frame rings: a ramp excites a vibration of frequency f by |sin(pi f T) / (pi f T)| of what a step
-would.
-
-Tolerance. Only LinuxCNC has one in its settings (G64 P of the start-up codes); else that of the built-in
-machines for such controls.
+its acceleration, jerk = acceleration / ramp time. `RAMP_TIME` is that of the built-in mill. A shorter time is
+right for light and stiff machines, a longer one where the frame rings: a ramp excites a vibration of
+frequency f by |sin(pi f T) / (pi f T)| of what a step would. Only LinuxCNC has a tolerance in its settings
+(G64 P of the start-up codes).
 """
 
 import dataclasses
@@ -42,8 +36,7 @@ CONTROLS: dict[str, ModuleType] = {"linuxcnc": linuxcnc, "klipper": klipper, "ma
 
 @dataclass(frozen=True)
 class Imported:
-    """text : of the machine file; machine : what it holds; assumed : what the settings do not say, one
-    sentence each"""
+    """text of the machine file; what it holds; what the settings do not say, one sentence each"""
 
     text: str
     machine: Machine
@@ -74,13 +67,14 @@ def import_machine(
     found, lathe = _with_y(_settings_of(text, source, control))
     axes, assumed = _axes(found, ramp_time, given or {}, source)
     assumed += lathe
-    eps = found.tolerance or Sourced(TOLERANCE[found.control], "assumed")
+    eps, dt = found.tolerance, found.dt
     if tolerance is not None:
         eps = Sourced(tolerance, "given")
-    dt = found.dt or Sourced(DT, "assumed")
-    if eps.place == "assumed":
+    if eps is None:
+        eps = Sourced(TOLERANCE[found.control], "assumed")
         assumed.append(f"tolerance {eps.value:g} mm: the settings have none; --tolerance gives another")
-    if dt.place == "assumed":
+    if dt is None:
+        dt = Sourced(DT, "assumed")
         assumed.append(f"interpolation period {dt.value * 1e3:g} ms: the settings do not say it")
     written = _text(found, Path(path), axes, eps, dt, [*found.notes, *assumed])
     machine = machine_from_dict(tomllib.loads(written), source=source)
@@ -145,11 +139,8 @@ def _axes(
                 own |= {name: end for name, end in (("travel_min", low), ("travel_max", high)) if end}
             axes[letter] = own
     if missing:
-        raise InputError(
-            f"{found.control}'s settings do not say {', '.join(missing)}; give them in mm and s: planner machine import, "
-            f"--set {missing[0]}=500",
-            source=source,
-        )
+        said = f"{found.control}'s settings do not say {', '.join(missing)}; give them in mm and s: "
+        raise InputError(f"{said}planner machine import, --set {missing[0]}=500", source=source)
     if not no_jerk:
         return axes, []
     said = f"jerk of {', '.join(no_jerk)}: acceleration / {ramp_time * 1e3:g} ms"
@@ -170,14 +161,19 @@ def _text(
     lines += [f"# Note: {sentence}." for sentence in said]
     lines += ["", f'name = "{name}"', _line("dt", dt), _line("tolerance", tolerance)]
     lines.append(f'path_control = "{found.path_control or "blend"}"')
-    if found.feed_max:
-        lines.append(_line("feed_max", found.feed_max))
+    lines += [_line("feed_max", found.feed_max)] if found.feed_max else []
     for letter, limits in axes.items():
-        lines += ["", f"[axes.{letter}]", *(_line(quantity, limit) for quantity, limit in limits.items())]
+        lines += _table(f"axes.{letter}", limits)
         lines += ["wrapped = true  # WRAPPED_ROTARY"] * (letter in found.wrapped)
-    lines += _tables(found)
-    if found.macros:
-        lines += ["", "[gcode_macros]"]
+    if found.inch or found.lathe:
+        lines += ["", "[dialect]", *["inch = true  # G20 is in force at the start"] * found.inch]
+        lines += ["lathe = false  # X is a radius until G7"] * found.lathe
+    # what its planner does, and how it carries the tool
+    law = {key: value for key, value in found.law.items() if value is not None}
+    lines += _table("control", {"name": found.control.lower(), **law})
+    for table, values in (("control.corner_jump", found.corner_jump), ("kinematics", found.kinematics)):
+        lines += _table(table, values) if values else []
+    lines += ["", "[gcode_macros]"] if found.macros else []
     for name, text in found.macros.items():
         escaped = text.expandtabs().replace("\\", "\\\\").replace('"', '\\"')
         lines += [f'"{name}" = """', *escaped.split("\n"), '"""']
@@ -192,20 +188,8 @@ def _text(
     return "".join(c if c.isprintable() or c == "\n" else "-" for line in lines for c in f"{line}\n")
 
 
-def _tables(found: ControlSettings) -> list[str]:
-    """The tables that say how the control reads programs, what its planner does, and how it carries the
-    tool."""
-    lines: list[str] = []
-    if found.inch or found.lathe:
-        lines += ["", "[dialect]", *["inch = true  # G20 is in force at the start"] * found.inch]
-        lines += ["lathe = false  # X is a radius until G7"] * found.lathe
-    lines += ["", "[control]", f'name = "{found.control.lower()}"']
-    lines += [_line(key, value) for key, value in found.law.items() if value is not None]
-    if found.corner_jump:
-        lines += ["", "[control.corner_jump]", *(_line(*jump) for jump in found.corner_jump.items())]
-    if found.kinematics:
-        lines += ["", "[kinematics]", *(_line(*pair) for pair in found.kinematics.items())]
-    return lines
+def _table(name: str, values: Mapping[str, Sourced | str]) -> list[str]:
+    return ["", f"[{name}]", *(_line(*pair) for pair in values.items())]
 
 
 def _line(key: str, found: Sourced | str) -> str:

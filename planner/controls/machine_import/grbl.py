@@ -24,8 +24,7 @@ def settings(text: str, source: str) -> ControlSettings:
         given.add("", found.group(1), Setting(found.group(2), source, line))
     given.counts_last()
     ends = {letter: given.number("", f"$13{k}") for k, letter in enumerate(_LETTERS)}
-    # machine coordinates of grbl end at 0
-    travel = {
+    travel = {  # machine coordinates of grbl end at 0
         letter: (Sourced(-abs(end.value), end.place), Sourced(0.0, f"{end.place}: it ends at 0"))
         for letter, end in ends.items()
         if end and end.value
@@ -34,11 +33,10 @@ def settings(text: str, source: str) -> ControlSettings:
     notes = []
     if travel and bounded and not bounded.value:
         travel = {}
-        notes += [
-            "$20 is 0, no soft limits: travel is left out, $130 and so on may be those of grbl's delivery"
-        ]
+        said = "$20 is 0, no soft limits: travel is left out, $130 and so on may be those of grbl's delivery"
+        notes.append(said)
     if laser and laser.value:
-        notes += ["$32, laser mode, is left out: M4 and S words change no times here"]
+        notes.append("$32, laser mode, is left out: M4 and S words change no times here")
     return ControlSettings(
         control="grbl",
         velocity=dict(given.limits(_LETTERS, "$11{axis}", 1.0 / SECONDS_PER_MINUTE)),

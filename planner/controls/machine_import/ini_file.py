@@ -38,17 +38,16 @@ _SAVED_LINE = "#*#"
 
 
 class _Line(NamedTuple):
-    """A line of a file; `after_include` where a file was included before it."""
+    """A line of a file."""
 
     text: str
     source: str
     number: int
-    after_include: bool = False
+    after_include: bool = False  # a file was included before it
 
 
 def read_linuxcnc_ini(text: str, source: str) -> Settings:
-    """The settings of an INI file, as LinuxCNC reads it. Raises InputError for files that include each
-    other."""
+    """An INI file, as LinuxCNC reads it. Raises InputError for files that include each other."""
     ini = Settings(begins=True)
     table: str | None = None
     pending = ""
@@ -72,18 +71,14 @@ def read_linuxcnc_ini(text: str, source: str) -> Settings:
 
 
 def read_klipper_config(text: str, source: str) -> Settings:
-    """The settings of a printer.cfg, as Klipper reads it.
-
-    Raises InputError for a setting outside of a table, for files that include each other and for those that
-    are not there.
-    """
+    """The settings of a printer.cfg, as Klipper reads it. Raises InputError for a setting outside of a table,
+    for files that include each other and for those that are not there."""
     text = text.replace("\r\n", "\n")
     mark = _SAVED.search(text)
     own, saved = (text[: mark.start()], text[mark.end() :].strip()) if mark else (text, "")
     lines = saved.split("\n") if saved else []
-    if any(not line.startswith(_SAVED_LINE) or line[3:4] not in ("", " ") for line in lines):
-        own, lines = text, []  # changed by hand: Klipper leaves it out
-    if f"\n{_SAVED_LINE} " in own:
+    wrong = any(not line.startswith(_SAVED_LINE) or line[3:4] not in ("", " ") for line in lines)
+    if wrong or f"\n{_SAVED_LINE} " in own:  # changed by hand: Klipper leaves it out
         own, lines = text, []
     config = _klipper_tables(own, source)
     if lines:
@@ -113,11 +108,8 @@ def _klipper_tables(text: str, source: str) -> Settings:
             table, key = header.group(1), ""
             config.names.append(table)
         elif not table:
-            raise InputError(
-                f"'{found[:40]}' is in no table: Klipper begins anew after an [include ...]; write its table above it again",
-                source=line.source,
-                line=line.number,
-            )
+            said = f"'{found[:40]}' is in no table: Klipper begins anew after an [include ...]; write its table above it again"
+            raise InputError(said, source=line.source, line=line.number)
         elif setting:
             key, indent = setting.group(1).lower(), depth
             config.add(table, key, Setting(setting.group(2), line.source, line.number))
@@ -138,8 +130,7 @@ def _expanded(
     left_out : takes a note on every file that is not there; None to refuse them
     included : the files so far
     """
-    included = [] if included is None else included
-    after = False
+    included, after = [] if included is None else included, False
     for number, line in enumerate(text.split("\n"), start=1):
         found = include.match(line)
         if not found:
@@ -150,19 +141,15 @@ def _expanded(
         for path in _files(name, source):
             included.append(str(path))
             if len(included) > INCLUDES_MAX:
-                raise InputError(
-                    f"more than {INCLUDES_MAX} files are included; is it a circle?",
-                    source=source,
-                    line=number,
-                )
+                said = f"more than {INCLUDES_MAX} files are included; is it a circle?"
+                raise InputError(said, source=source, line=number)
             try:
                 part = read_settings(path, f"included in {source}, line {number}: ")
             except InputError:
                 if left_out is None:
                     raise
-                left_out.append(
-                    f"line {number}: the file '{name}' cannot be read and is left out, as in LinuxCNC"
-                )
+                said = f"line {number}: the file '{name}' cannot be read and is left out, as in LinuxCNC"
+                left_out.append(said)
                 continue
             yield from _expanded(part, str(path), include, left_out, included)
 

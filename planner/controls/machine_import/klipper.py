@@ -2,15 +2,21 @@
 [input_shaper] with the modes of the frame.
 
 Klipper limits velocity and acceleration along the path, a machine file those of each axis: an axis may use
-them alone. What it does at corners is in the table [control] of the machine file, for predictions of its
-times (controls/timing/models.py).
+them alone. What it does at corners goes to the table [control], for predictions (controls/timing/models.py).
 """
 
 import re
 
 from planner.base.errors import InputError
 from planner.controls.machine_import.ini_file import read_klipper_config
-from planner.controls.machine_import.settings import ControlSettings, FoundMode, Settings, Sourced, least
+from planner.controls.machine_import.settings import (
+    ControlSettings,
+    Ends,
+    FoundMode,
+    Settings,
+    Sourced,
+    least,
+)
 
 _PER_AXIS = ("cartesian", "corexy", "hybrid_corexy", "corexz", "hybrid_corexz", "generic_cartesian")
 _MACRO = re.compile(r"gcode_macro\s+(\w+(?:\.\d+)?)", re.IGNORECASE | re.ASCII)
@@ -26,15 +32,13 @@ def recognised(text: str) -> bool:
 
 
 def settings(text: str, source: str) -> ControlSettings:
-    """The settings of a printer.cfg. Raises InputError for kinematics without limits of their own for x, y
-    and z, and for numbers that cannot be read."""
+    """Of a printer.cfg. Raises InputError for kinematics without limits of their own for x, y and z."""
     config = read_klipper_config(text, source)
     kinematics = config.text("printer", "kinematics")
     if kinematics is not None and kinematics not in _PER_AXIS:
-        raise InputError(
-            f"[printer] kinematics is {kinematics}; limits of x, y and z are known for {', '.join(_PER_AXIS)}",
-            source=source,
-        )
+        known = ", ".join(_PER_AXIS)
+        said = f"[printer] kinematics is {kinematics}; limits of x, y and z are known for {known}"
+        raise InputError(said, source=source)
     limits = {}
     for key in ("velocity", "accel"):
         path, z = (config.positive("printer", f"max_{which}{key}") for which in ("", "z_"))
@@ -47,6 +51,10 @@ def settings(text: str, source: str) -> ControlSettings:
         if frequency := config.positive("input_shaper", f"shaper_freq_{letter}"):
             found = FoundMode(frequency.value, damping.value if damping else _DAMPING, frequency.place)
             modes.setdefault(frequency.value, found)
+    cruise = config.number("printer", "minimum_cruise_ratio")
+    older = config.positive("printer", "max_accel_to_decel")  # what is left for what is gained and lost
+    if cruise is None and older is not None and along is not None:
+        cruise = Sourced(1.0 - min(1.0, older.value / along.value), older.place)
     return ControlSettings(
         control="Klipper",
         velocity=limits["velocity"],
@@ -55,7 +63,7 @@ def settings(text: str, source: str) -> ControlSettings:
         law={
             "acceleration": along,
             "square_corner_velocity": config.number("printer", "square_corner_velocity") or _CORNER_SPEED,
-            "minimum_cruise_ratio": _cruise_ratio(config, along),
+            "minimum_cruise_ratio": cruise or _CRUISE_RATIO,
         },
         travel=_travel(config),
         macros=_macros(config),
@@ -64,25 +72,14 @@ def settings(text: str, source: str) -> ControlSettings:
     )
 
 
-def _cruise_ratio(config: Settings, acceleration: Sourced | None) -> Sourced:
-    """The minimum cruise ratio; of older files max_accel_to_decel, the acceleration that is left for what is
-    gained and lost."""
-    found = config.number("printer", "minimum_cruise_ratio")
-    older = config.positive("printer", "max_accel_to_decel")
-    if found is None and older is not None and acceleration is not None:
-        return Sourced(1.0 - min(1.0, older.value / acceleration.value), older.place)
-    return found or _CRUISE_RATIO
-
-
 def _notes(config: Settings) -> list[str]:
     """Sentences on what a machine file does not have, and a program may ask for."""
     said = ["velocity and acceleration are limits along the path in Klipper and of each axis here"]
     if "extruder" in config.names:
         said.append("limits of [extruder] are left out: a table [axes.e] takes them")
     if "gcode_arcs" not in config.names:
-        said.append(
-            "Klipper reads no G2 and G3 here, for want of [gcode_arcs]: programs with arcs fail on it"
-        )
+        arcs = "Klipper reads no G2 and G3 here, for want of [gcode_arcs]: programs with arcs fail on it"
+        said.append(arcs)
     macros = [_MACRO.fullmatch(name) for name in config.names]
     renamed = [macro[1].upper() for macro in macros if macro and config.text(macro[0], "rename_existing")]
     if renamed:
@@ -104,8 +101,8 @@ def _macros(config: Settings) -> dict[str, str]:
     return macros
 
 
-def _travel(config: Settings) -> dict[str, tuple[Sourced | None, Sourced | None]]:
-    travel: dict[str, tuple[Sourced | None, Sourced | None]] = {}
+def _travel(config: Settings) -> dict[str, Ends]:
+    travel: dict[str, Ends] = {}
     for letter in "xyz":
         low, high = (config.number(f"stepper_{letter}", f"position_{end}") for end in ("min", "max"))
         if high is not None:

@@ -32,7 +32,7 @@ from planner.controls.machine_import.settings import (
     Sourced,
     leading_number,
     least,
-)  # fmt: skip
+)
 from planner.machine import ROTARY_AXES
 from planner.machine.parts import AXIS_LIMIT_MAX, XYZAC, XYZBC
 
@@ -41,9 +41,12 @@ _LETTERS = "xyzabcuvw"  # in the order of LinuxCNC's axes
 # (src/emc/ini/emcIniFile.cc).
 _MM = {"mm": 1.0, "metric": 1.0, "inch": MM_PER_INCH, "in": MM_PER_INCH, "imperial": MM_PER_INCH}
 _DEGREES = {
-    **dict.fromkeys(("deg", "degree"), 1.0),
-    **dict.fromkeys(("grad", "gon"), 0.9),
-    **dict.fromkeys(("rad", "radian"), 1.0 / RAD_PER_DEG),
+    "deg": 1.0,
+    "degree": 1.0,
+    "grad": 0.9,
+    "gon": 0.9,
+    "rad": 1.0 / RAD_PER_DEG,
+    "radian": 1.0 / RAD_PER_DEG,
 }
 _JOINTS = {"trivkins": _LETTERS, "xyzac-trt-kins": "xyzac", "xyzbc-trt-kins": "xyzbc"}
 _DEFAULT = 1.0  # [units/s and units/s2] of a limit that is not set
@@ -51,9 +54,7 @@ _NANOSECOND = 1e-9  # [s]: periods of HAL's threads are in them
 _SAME = 1e-3  # of two units: numbers such as 0.03937 are inches
 _TABLES = r"EMC|EMCMOT|TRAJ|KINS|DISPLAY|JOINT_\d+|AXIS_\w"
 # Start-up codes that are those of every program's start or have a key of the machine file.
-_USUAL = frozenset(
-    f"G{code}" for code in (17, 20, 21, 40, 49, 54, 61, 61.1, 64, 80, 90, 91.1, 92.1, 94, 97, 98, 99)
-)
+_USUAL = {f"G{code}" for code in (17, 20, 21, 40, 49, 54, 61, 61.1, 64, 80, 90, 91.1, 92.1, 94, 97, 98, 99)}
 _PATH_CONTROL = {"G64": "blend", "G61": "exact_path", "G61.1": "exact_stop"}
 # Files that a machine file does not have: what they hold, and the table that takes it.
 _FILES = {
@@ -64,10 +65,8 @@ _FILES = {
 }  # fmt: skip
 _STARTUP = "RS274NGC", "RS274NGC_STARTUP_CODE"
 _TYPES = {f"{XYZAC}-kins": XYZAC, f"{XYZBC}-kins": XYZBC}  # module of LinuxCNC: type of a machine file
-_DISTANCES = {
-    XYZAC: ("x-rot-point", "y-rot-point", "z-rot-point", "y-offset", "z-offset"),
-    XYZBC: ("x-rot-point", "y-rot-point", "z-rot-point", "x-offset", "z-offset"),
-}
+_ROTATION = "x-rot-point", "y-rot-point", "z-rot-point"
+_DISTANCES = {XYZAC: (*_ROTATION, "y-offset", "z-offset"), XYZBC: (*_ROTATION, "x-offset", "z-offset")}
 
 
 def recognised(text: str) -> bool:
@@ -77,8 +76,7 @@ def recognised(text: str) -> bool:
 
 def settings(text: str, source: str) -> ControlSettings:
     """The settings of an INI file. Raises InputError for units and numbers that cannot be read."""
-    ini = read_linuxcnc_ini(text, source)
-    return _Found(ini, source).settings()
+    return _Found(read_linuxcnc_ini(text, source), source).settings()
 
 
 class _Found:
@@ -92,9 +90,8 @@ class _Found:
         found = ini.text("TRAJ", "COORDINATES") or "xyz"
         self.letters = [letter for letter in _LETTERS if letter in found.lower()]
         self.scale = {letter: turn if letter in ROTARY_AXES else self.unit for letter in _LETTERS}
-        self.table = {
-            letter: f"AXIS_{k}" if self.old else f"AXIS_{letter.upper()}" for k, letter in enumerate(_LETTERS)
-        }
+        names = enumerate(_LETTERS)
+        self.table = {c: f"AXIS_{k}" if self.old else f"AXIS_{c.upper()}" for k, c in names}
         self.module, *words = (ini.text("KINS", "KINEMATICS") or "trivkins").split()
         self.module = self.module.lower()
         given = re.search(r"coordinates\s*=\s*([a-z]+)", " ".join(words), re.IGNORECASE)
@@ -140,16 +137,13 @@ class _Found:
                 own = Sourced(own.value * (1.0 - ratio.value), f"{own.place}, less OFFSET_AV_RATIO")
             linear = along is not None and letter not in ROTARY_AXES
             path = self.ini.positive("TRAJ", along or "", self.unit) if linear else None
-            joints = [
-                self.ini.positive(f"JOINT_{n}", key, scale) for n, c in enumerate(self.joints) if c == letter
-            ]
+            numbers = (n for n, c in enumerate(self.joints) if c == letter)
+            joints = [self.ini.positive(f"JOINT_{n}", key, scale) for n in numbers]
             if found := least(*map(_possible, (own, *joints, path))):
                 limits[letter] = found
         if by_default:
-            self.notes.append(
-                f"{key} of {', '.join(by_default)} is not set; LinuxCNC's default is {default:g} unit a second"
-                + (" squared" if "ACC" in key else "")
-            )
+            said = f"{key} of {', '.join(by_default)} is not set; LinuxCNC's default is {default:g} unit a second"
+            self.notes.append(said + " squared" * ("ACC" in key))
         return limits
 
     def _startup(self) -> tuple[Sourced | None, str | None, bool]:
@@ -168,10 +162,7 @@ class _Found:
 
     def _kinematics(self) -> dict[str, Sourced | str]:
         """The table [kinematics], empty for other modules than tilting rotary tables; notes on what it does
-        not say.
-
-        Raises InputError for a distance that is no number.
-        """
+        not say. Raises InputError for a distance that is no number."""
         module = self.module
         if jointless := [letter for letter in self.letters if self.joints and letter not in self.joints]:
             named = ", ".join(jointless)
@@ -186,15 +177,13 @@ class _Found:
         found: dict[str, Sourced | str] = {"type": kind}
         for name in _DISTANCES[kind]:
             place = f"{module}.{name}"
-            pin = pins.number("", place, self.unit) or Sourced(0.0, place)
-            found[name.replace("-", "_")] = pin
+            found[name.replace("-", "_")] = pins.number("", place, self.unit) or Sourced(0.0, place)
         turned = f"{module}.conventional-directions"
         if (pins.text("", turned) or "0").lower() not in ("0", "false"):
             self.notes.append(f"{turned} is set: write the axes that turn left-handed here under `reversed`")
         if "identityfirst" not in (self.ini.text("KINS", "KINEMATICS") or ""):
-            self.notes.append(
-                f"{module} begins with the tool centre point on; here a program switches it on by M428 or G43.4"
-            )
+            said = f"{module} begins with the tool centre point on; here a program switches it on by M428 or G43.4"
+            self.notes.append(said)
         return found
 
     def _pins(self) -> Settings:
@@ -269,8 +258,6 @@ def _unit(
         return MM_PER_INCH if named is _MM and abs(number / per_inch - 1.0) < _SAME else 1.0 / number
     name = text.split()[0].lower()
     if name not in named:
-        raise InputError(
-            f"[TRAJ] {key} is {text!r}; allowed are {', '.join(named)} and numbers of units per {'mm' if named is _MM else 'degree'}",
-            source=source,
-        )
+        known = f"{', '.join(named)} and numbers of units per {'mm' if named is _MM else 'degree'}"
+        raise InputError(f"[TRAJ] {key} is {text!r}; allowed are {known}", source=source)
     return named[name]

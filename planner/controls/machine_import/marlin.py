@@ -71,9 +71,7 @@ def _ends(said: str, words: dict[str, str]) -> list[tuple[str, str, str]]:
     ranges = _RANGE.findall(said)
     end = "low" if float(words.get("S", 0.0)) == 1 else "high"
     named = {letter for letter, *_ in ranges}
-    both = [
-        (c, name, number) for c, *two in ranges for name, number in zip(("low", "high"), two, strict=True)
-    ]
+    both = [(c, *one) for c, *two in ranges for one in zip(("low", "high"), two, strict=True)]
     return both + [(c, end, words[c]) for c in _LETTERS.upper() if c in words and c not in named]
 
 

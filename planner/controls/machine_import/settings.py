@@ -1,5 +1,4 @@
-"""Settings of a control as they stand in its text, and what they say about a machine; each number with its
-place."""
+"""Settings of a control as they stand in its text, and what they say about a machine."""
 
 from __future__ import annotations
 
@@ -21,6 +20,9 @@ class Sourced(NamedTuple):
     place: str
 
 
+Ends = tuple[Sourced | None, Sourced | None]  # the lower and the upper one
+
+
 class FoundMode(NamedTuple):
     """A vibration mode: frequency [Hz], damping ratio [-], and where it stands."""
 
@@ -31,33 +33,27 @@ class FoundMode(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ControlSettings:
-    """The settings of one control, in mm (degrees for rotary axes) and s. By axis letter where they are
-    mappings."""
+    """The settings of one control, in mm (rotary axes: degrees) and s; mappings are by axis letter."""
 
     control: str
     velocity: Mapping[str, Sourced]
     acceleration: Mapping[str, Sourced]
     jerk: Mapping[str, Sourced] = field(default_factory=dict)
-    # least and greatest place of the axes in machine coordinates [mm, deg]
-    travel: Mapping[str, tuple[Sourced | None, Sourced | None]] = field(default_factory=dict)
+    travel: Mapping[str, Ends] = field(default_factory=dict)  # in machine coordinates [mm, deg]
     wrapped: str = ""  # letters of rotary axes whose places are within a turn
     feed_max: Sourced | None = None  # largest feed along the path [mm/s]
     dt: Sourced | None = None  # interpolation period [s]
-    # of G64 P [mm], path_control: "blend", "exact_path" or "exact_stop", of a start-up code
-    tolerance: Sourced | None = None
-    path_control: str | None = None
+    tolerance: Sourced | None = None  # of G64 P [mm]
+    path_control: str | None = None  # "blend", "exact_path" or "exact_stop", of a start-up code
     inch: bool = False  # whether programs without G20 and G21 are in inches
     lathe: bool = False  # whether it is a lathe whose programs have radii until G7
-    # keys of the table [control] of a machine file, and what the control has for them
+    # keys of the tables [control] and [kinematics] of a machine file; "type" is a text
     law: Mapping[str, Sourced | None] = field(default_factory=dict)
-    # jump of velocity that a corner may have [mm/s]
-    corner_jump: Mapping[str, Sourced] = field(default_factory=dict)
-    # keys of the table [kinematics] of a machine file; "type" is a text
     kinematics: Mapping[str, Sourced | str] = field(default_factory=dict)
+    corner_jump: Mapping[str, Sourced] = field(default_factory=dict)  # of velocity, at a corner [mm/s]
     macros: Mapping[str, str] = field(default_factory=dict)  # lines of commands by their names
     modes: tuple[FoundMode, ...] = ()  # vibration modes that the control suppresses
-    # what of the settings has no counterpart in a machine file, one sentence each
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what has no counterpart in a machine file, one sentence each
 
 
 class Setting(NamedTuple):
@@ -69,19 +65,14 @@ class Setting(NamedTuple):
 
 
 class Settings:
-    """Settings by table and key.
-
-    place  : how a message names one, such as "[{table}] {key}"
-    begins : whether a number is what a text begins with ("3 mm", as C's scanf reads it), not all of it
-    names  : of the tables
-    notes  : what was left out, one sentence each
-    """
+    """Settings by table and key. A message names one by `place`; `begins` says whether a number is what a
+    text begins with ("3 mm", as C's scanf reads it), not all of it."""
 
     def __init__(self, place: str = "[{table}] {key}", *, begins: bool = False) -> None:
         self._place, self._begins = place, begins
         self._found: dict[tuple[str, str], list[Setting]] = {}
-        self.names: list[str] = []
-        self.notes: list[str] = []
+        self.names: list[str] = []  # of the tables
+        self.notes: list[str] = []  # what was left out, one sentence each
 
     def add(self, table: str, key: str, setting: Setting) -> None:
         """Take in a setting behind those of the same key that are there."""
@@ -93,7 +84,7 @@ class Settings:
         found[-1] = found[-1]._replace(text=f"{found[-1].text}\n{text}")
 
     def counts_last(self) -> None:
-        """Keep only the last of equal keys."""
+        """Of equal keys keep the last."""
         self._found = {key: found[-1:] for key, found in self._found.items()}
 
     def take_missing(self, other: Settings) -> None:
@@ -124,20 +115,19 @@ class Settings:
             return None
         text, source, line = found[0]
         place = self._place.format(table=table, key=key)
-        begun = leading_number(text) if self._begins else None
-        try:
-            value = float(text.strip()) if begun is None else begun
-        except ValueError:
-            value = math.nan
+        value = leading_number(text) if self._begins else None
+        if value is None:
+            try:
+                value = float(text.strip())
+            except ValueError:
+                value = math.nan
         if not math.isfinite(value):
-            raise InputError(
-                f"{place}: a number is needed, found {text.strip()[:40]!r}", source=source, line=line
-            )
+            said = f"{place}: a number is needed, found {text.strip()[:40]!r}"
+            raise InputError(said, source=source, line=line)
         return Sourced(value * scale, place)
 
     def positive(self, table: str, key: str, scale: float = 1.0) -> Sourced | None:
-        """A setting's number, times `scale`; None where it is not set. Raises InputError if it is none above
-        0."""
+        """`number`. Raises InputError if it is none above 0."""
         found = self.number(table, key, scale)
         if found is not None and found.value <= 0:
             text, source, line = self._found[table, key][0]
@@ -148,8 +138,8 @@ class Settings:
     def limits(
         self, letters: str, key: str, scale: float = 1.0, *, table: str = ""
     ) -> Iterator[tuple[str, Sourced]]:
-        """The axes that have a number above 0 under a key, and it; "{letter}" and "{axis}", the number of the
-        axis in `letters`, are filled in."""
+        """The axes that have a number above 0 under a key, and it; "{letter}" and "{axis}", its number in
+        `letters`, are filled in."""
         for k, letter in enumerate(letters):
             if found := self.positive(table, key.format(letter=letter.upper(), axis=k), scale):
                 yield letter, found

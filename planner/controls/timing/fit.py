@@ -27,14 +27,12 @@ from planner.nc.reader import read_program
 
 KLIPPER = "klipper"
 LASTS = 60.0  # [s]: long beside the tenths of a stopwatch
-SHARE = (
-    0.25  # of the way v^2 / a on which an axis reaches its speed and brakes: moves that tell the acceleration
-)
+# of the way v^2 / a on which an axis reaches its speed and brakes: moves that tell the acceleration
+SHARE = 0.25
 FAR = 40.0  # longest move [mm]
 LOW = 0.1  # of the smallest velocity: the feed that tells the factor
 LEAST = 0.05  # shortest side of the small square [mm]
-# of v^2 / a, the side of the small square on Klipper, which passes no corner faster than v^2 = a side / 2
-ROOM = 8.0
+ROOM = 8.0  # the same on Klipper, of v^2 / a: it passes no corner faster than v^2 = a side / 2
 RANGE = 10.0  # how far settings may be from those of the file
 FACTORS = (0.5, 2.0)  # within which the factor is sought
 HEAD = "G21 G90 G94"
@@ -42,16 +40,11 @@ HEAD = "G21 G90 G94"
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """What was fitted.
+    """What was fitted."""
 
-    machine   : with the settings found
-    settings  : name, value before, value found
-    residuals : name of each program, measured and predicted seconds
-    """
-
-    machine: Machine
-    settings: tuple[tuple[str, float, float], ...]
-    residuals: tuple[tuple[str, float, float], ...]
+    machine: Machine  # with the settings found
+    settings: tuple[tuple[str, float, float], ...]  # name, value before, value found
+    residuals: tuple[tuple[str, float, float], ...]  # name of each program, measured and predicted seconds
 
     def residual_texts(self) -> list[str]:
         """The residuals in words."""
@@ -71,8 +64,7 @@ def programs_to_time(machine: Machine, control: str) -> dict[str, str]:
             there = f"G1 {letter.upper()}{size:.4f} F{axis.velocity * SECONDS_PER_MINUTE:.1f}"
             way = [there, f"G0 {letter.upper()}0"]  # LinuxCNC rounds nothing between G1 and G0
             programs[f"{letter}.nc"] = _repeated(way, machine, control)
-    slow = min(machine.axes[letter].velocity for letter in "xy")
-    accel = min(machine.axes[letter].acceleration for letter in "xy")
+    slow, accel = (min(getattr(machine.axes[c], of) for c in "xy") for of in ("velocity", "acceleration"))
     planner = as_set(CONTROLS[control], machine) if control != LINUXCNC else None
     deviation = (planner.junction_deviation if planner else None) or 0.01
     corner = planner.square_corner_velocity if planner else None
@@ -98,9 +90,7 @@ def _repeated(way: list[str], machine: Machine, control: str) -> str:
 
 
 def fitted(measured: Mapping[str, tuple[Program, float]], machine: Machine, control: str) -> Found:
-    """The settings with which the model comes nearest to measured times.
-
-    measured : program and seconds by name
+    """The settings with which the model comes nearest to `measured` times, program and seconds by name.
 
     Raises InputError for fewer times than settings, and for times that no settings within the range explain.
     """
@@ -108,9 +98,8 @@ def fitted(measured: Mapping[str, tuple[Program, float]], machine: Machine, cont
 
     names, start = _sought(measured, machine, control)
     if len(measured) < len(names):
-        raise InputError(
-            f"{len(measured)} times for {len(names)} settings ({', '.join(names)}): run all of the test programs"
-        )
+        said = f"{len(measured)} times for {len(names)} settings ({', '.join(names)}): run all of the test programs"
+        raise InputError(said)
     seconds = np.array([took for _, took in measured.values()])
 
     def times(log: FloatArray) -> FloatArray:
@@ -124,9 +113,8 @@ def fitted(measured: Mapping[str, tuple[Program, float]], machine: Machine, cont
     values = start * np.exp(done.x)
     if (np.abs(done.x) > 0.999 * most).any():
         name = names[int(np.argmax(np.abs(done.x) / most))]
-        raise InputError(
-            f"the times lead to a {name} out of range: are they of these programs, in s, at 100 % feed?"
-        )
+        said = f"the times lead to a {name} out of range: are they of these programs, in s, at 100 % feed?"
+        raise InputError(said)
     return Found(
         machine=_with(machine, control, dict(zip(names, values, strict=True))),
         settings=tuple(zip(names, start.tolist(), values.tolist(), strict=True)),
@@ -147,32 +135,31 @@ def _sought(
     if control != LINUXCNC:
         planner = as_set(CONTROLS[control], machine)
         if planner.corner_jump:
-            raise InputError(
+            said = (
                 "corner_jump, M205 X Y Z, is not found from times; take it from the settings of the control"
             )
-        for name in ("square_corner_velocity", "junction_deviation"):
-            if value := getattr(planner, name):
-                start[name] = value
+            raise InputError(said)
+        names = ("square_corner_velocity", "junction_deviation")
+        start |= {name: value for name in names if (value := getattr(planner, name))}
     return [*start, "factor"], np.array([*start.values(), 1.0])
 
 
 def _with(machine: Machine, control: str, values: Mapping[str, float]) -> Machine:
     """The machine with other settings: what the control allows along the path grows with its axes."""
     data = machine.model_dump(exclude_defaults=True)
-    before = data.get("control", {})
-    data["control"] = {**(before if before.get("name") == control else {}), "name": control}
+    before, axes = data.get("control", {}), data["axes"]
+    given = data["control"] = {**(before if before.get("name") == control else {}), "name": control}
     for name, value in values.items():
         letter, dot, _ = name.partition(".")
         if dot:
-            data["axes"][letter]["acceleration"] = value
+            axes[letter]["acceleration"] = value
         else:
-            data["control"][name] = value
-    for letter in "xy" if control == KLIPPER else "":
-        data["axes"][letter]["acceleration"] = data["control"].get(
-            "acceleration", machine.axes[letter].acceleration
-        )
-    if control != KLIPPER and "acceleration" in data["control"]:
-        data["control"]["acceleration"] = max(data["axes"][letter]["acceleration"] for letter in "xy")
+            given[name] = value
+    if control == KLIPPER:
+        for letter in "xy":
+            axes[letter]["acceleration"] = given.get("acceleration", machine.axes[letter].acceleration)
+    elif "acceleration" in given:
+        given["acceleration"] = max(axes[letter]["acceleration"] for letter in "xy")
     return machine_from_dict(data)
 
 

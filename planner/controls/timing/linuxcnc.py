@@ -98,10 +98,8 @@ def lines(points: FloatArray) -> Bends:
     length = np.linalg.norm(step, axis=1)
     way = step / np.maximum(length, 1e-300)[:, None]
     flat = np.full(len(length), np.inf)
-    none = np.zeros_like(way)
-    return Bends(
-        first=way, last=way, length=length, radius=flat, radial=none, across=none, parts=np.ones(len(length))
-    )
+    none, one = np.zeros_like(way), np.ones(len(length))
+    return Bends(first=way, last=way, length=length, radius=flat, radial=none, across=none, parts=one)
 
 
 def linuxcnc_times(
@@ -232,16 +230,14 @@ def _in_the_plane(first: FloatArray, second: FloatArray, limit: FloatArray) -> F
 def _corners(
     bends: Bends, top: FloatArray, tolerance: FloatArray, limits: _Limits
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The n-1 corners of n moves: tangent length, length of the arc (0 of a kink), speed, and the
-    acceleration left along it."""
+    """Of the n-1 corners: tangent length, length of the arc (0 of a kink), speed, acceleration along it."""
     before, after, length = bends.last[:-1], bends.first[1:], bends.length
     a = _in_the_plane(before, after, limits.acceleration)
     half = np.arctan2(np.linalg.norm(after - before, axis=1), np.linalg.norm(after + before, axis=1))
     slow, fast = np.minimum(top[1:], top[:-1]), np.maximum(top[1:], top[:-1])
     h = np.clip(half, STRAIGHT, HALF_TURN - STRAIGHT)
-    cut = np.minimum(
-        tolerance * np.sin(h) / np.maximum(1.0 - np.cos(h), 1e-300), 0.5 * np.minimum(length[1:], length[:-1])
-    )
+    short = 0.5 * np.minimum(length[1:], length[:-1])
+    cut = np.minimum(tolerance * np.sin(h) / np.maximum(1.0 - np.cos(h), 1e-300), short)
     widest = cut / np.tan(h)
     speed = np.minimum(np.sqrt(NORMAL * a * widest), fast)
     blended = np.minimum(np.sqrt(a * cut), speed) / (0.5 * a) * speed  # length of a parabolic blend

@@ -29,8 +29,8 @@ at once (r: "minimum cruise ratio", 0.5): its speed in between is at most that o
 A block takes at least `block_time`, the time to send and read its line. What [control] of the machine file
 says of the same control takes the place of the values here.
 
-Tested against these controls' own code on five programs where their times are at hand
-(tests/controls/timing/test_models.py); benchmarks/results/control-time.md has the errors on real programs.
+tests/controls/timing/test_models.py and benchmarks/results/control-time.md hold them against the controls'
+own code.
 """
 
 import dataclasses
@@ -44,10 +44,8 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.errors import InputError
 from planner.machine import Machine
 
-# Turning angles below this pass at any speed [rad]: 1 - s would be lost in rounding.
-STRAIGHT = 1e-6
-# A speed of nothing [mm/s], so that pieces without a length where the motion stands take no time.
-STANDING = 1e-12
+STRAIGHT = 1e-6  # turning angles below this pass at any speed [rad]: 1 - s would be lost in rounding
+STANDING = 1e-12  # a speed of nothing [mm/s]: pieces without a length where the motion stands take no time
 CHORD_MIN = 0.1  # of Marlin's chords, MIN_ARC_SEGMENT_MM [mm]
 SMALL_BLOCK, SMALL_TURN = 1.0, np.pi / 4  # Marlin's "small segments": shorter [mm], and turning by less [rad]
 
@@ -58,18 +56,15 @@ class Control:
 
     name: str
     junction_deviation: float | None = None  # [mm]; None for Klipper
-    # speed at a corner of 90 degrees [mm/s]; None for grbl and Marlin
-    square_corner_velocity: float | None = None
+    square_corner_velocity: float | None = None  # at a corner of 90 degrees [mm/s]; None for grbl and Marlin
     minimum_cruise_ratio: float = 0.5  # of Klipper [-]
     acceleration: float | None = None  # largest along the path [mm/s2]; None where it has none of its own
-    # jump of velocity by axis [mm/s] that a corner may have, instead of a deviation
-    corner_jump: Mapping[str, float] = field(default_factory=dict)
+    corner_jump: Mapping[str, float] = field(default_factory=dict)  # by axis, instead of a deviation [mm/s]
     blocks: int | None = None  # how many blocks it looks ahead; None for all
     block_time: float = 0.0  # least time of a block [s]
     factor: float = 1.0  # by which it is slower than this model (timing/fit.py) [-]
-    # how it cuts arcs into chords: how far they may miss it [mm], or how long they may be [mm]
-    chord_miss: float | None = None
-    chord_length: float | None = None
+    chord_miss: float | None = None  # of chords of an arc: how far they may miss it [mm] ...
+    chord_length: float | None = None  # ... or how long they may be [mm]
     chords_least: int = 1  # of a full turn
     rapid_feed: bool = False  # G0 moves at the F in force
 
@@ -79,19 +74,18 @@ class Control:
 # MAX_ARC_SEGMENT_MM 1, MIN_CIRCLE_SEGMENTS 72; Klipper: Config_Reference, square_corner_velocity 5,
 # minimum_cruise_ratio 0.5, [gcode_arcs] resolution 1. Lines of some 30 characters at 115,200 baud take 2.6 ms
 # (grbl, Marlin); Klipper reads a file.
-CONTROLS: dict[str, Control] = {
-    "grbl": Control(name="grbl", junction_deviation=0.01, blocks=14, block_time=0.0026, chord_miss=0.002),
-    "klipper": Control(name="klipper", square_corner_velocity=5.0, chord_length=1.0, rapid_feed=True),
-    "marlin": Control(
-        name="marlin",
-        junction_deviation=0.013,
-        blocks=14,
-        block_time=0.0026,
-        chord_length=1.0,
-        chords_least=72,
-        rapid_feed=True,
-    ),
-}
+GRBL = Control(name="grbl", junction_deviation=0.01, blocks=14, block_time=0.0026, chord_miss=0.002)
+KLIPPER = Control(name="klipper", square_corner_velocity=5.0, chord_length=1.0, rapid_feed=True)
+MARLIN = dataclasses.replace(
+    GRBL,
+    name="marlin",
+    junction_deviation=0.013,
+    chord_miss=None,
+    chord_length=1.0,
+    chords_least=72,
+    rapid_feed=True,
+)
+CONTROLS = {control.name: control for control in (GRBL, KLIPPER, MARLIN)}
 
 
 def as_set(control: Control, machine: Machine) -> Control:
@@ -104,12 +98,8 @@ def as_set(control: Control, machine: Machine) -> Control:
 
 def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArray, FloatArray, Array, Array]:
     """Vertices (k+1, A), feeds (k,) and stops (k+1,) without the moves that move nothing, and which moves are left (n,): a
-    stop between these belongs to the vertex before.
-
-    points, feed, stop : (n+1, A), (n,) and (n+1,), as of `predicted_times`
-
-    Raises InputError where nothing moves.
-    """
+    stop between these belongs to the vertex before. Of the arguments of `predicted_times`. Raises InputError
+    where nothing moves."""
     moves = (np.diff(points, axis=0) != 0.0).any(axis=1)
     if not moves.any():
         raise InputError("the path moves nowhere")
@@ -140,7 +130,11 @@ def predicted_times(
     way = step / length[:, None]
     control = as_set(control, machine)
     velocity, acceleration = (machine.limits(name, axes) for name in ("velocity", "acceleration"))
-    speed, accel_max = _along_the_path(machine, control)
+    speed, accel_max = np.inf, control.acceleration or np.inf  # along the path, whatever the axes allow
+    if control.square_corner_velocity is not None:
+        plane = [machine.axes[letter] for letter in "xy"]
+        speed = machine.feed_max or min(axis.velocity for axis in plane)
+        accel_max = control.acceleration or min(axis.acceleration for axis in plane)
     top = np.minimum(np.minimum(feed, along(way, velocity)), speed)
     if control.block_time:
         top = np.minimum(top, length / control.block_time)
@@ -152,10 +146,10 @@ def predicted_times(
     times = np.zeros(len(moves))
     if control.square_corner_velocity is not None:
         lost = 2.0 * length * np.minimum(accel, (1.0 - control.minimum_cruise_ratio) * accel_max)
-        parts = [0, *(np.flatnonzero(stands[1:-1]) + 1), len(length)]
+        parts = pairwise([0, *(np.flatnonzero(stands[1:-1]) + 1), len(length)])
         found = [
             _smoothed_times(length[i:k], top[i:k] ** 2, accel[i:k], bound[i : k + 1], lost[i:k])
-            for i, k in pairwise(parts)
+            for i, k in parts
         ]
         times[moves] = control.factor * np.concatenate(found)
         return times
@@ -169,10 +163,8 @@ def predicted_times(
 
 
 def chords(control: Control, length: FloatArray, sweep: FloatArray, radius: FloatArray) -> Array:
-    """(n,) into how many chords a control cuts arcs.
-
-    length : (n,) [mm], rise included; sweep : (n,) [rad]; radius : (n,) [mm]
-    """
+    """(n,) into how many chords a control cuts arcs of a `length` (n,) [mm], rise included, a `sweep` (n,)
+    [rad] and a `radius` (n,) [mm]."""
     if control.chord_miss is not None:
         miss = np.minimum(control.chord_miss, radius)
         count = 0.5 * sweep * radius / np.sqrt(miss * (2.0 * radius - miss))
@@ -188,16 +180,6 @@ def along(way: FloatArray, limit: FloatArray) -> FloatArray:
     with np.errstate(divide="ignore"):
         allowed: FloatArray = (limit / np.abs(way)).min(axis=1)
     return allowed
-
-
-def _along_the_path(machine: Machine, control: Control) -> tuple[float, float]:
-    """Largest speed [mm/s] and acceleration [mm/s2] along the path, whatever the axes allow; inf where the
-    control has none."""
-    if control.square_corner_velocity is None:
-        return np.inf, control.acceleration or np.inf
-    plane = [machine.axes[letter] for letter in "xy"]
-    speed = machine.feed_max or min(axis.velocity for axis in plane)
-    return speed, control.acceleration or min(axis.acceleration for axis in plane)
 
 
 def _corner_sq(
@@ -238,8 +220,8 @@ def _corner_sq(
 
 
 def reachable(bound: FloatArray, gain: FloatArray) -> FloatArray:
-    """(n+1,) squares of speeds, each at most its bound (n+1,), that blocks with 2 a l = gain (n,) lead to,
-    and lead on from."""
+    """(n+1,) squares of speeds at most `bound` (n+1,) that blocks with 2 a l = gain (n,) lead to and on
+    from."""
     s = np.append(0.0, np.cumsum(gain))
     back = np.minimum.accumulate((bound + s)[::-1])[::-1] - s
     found: FloatArray = np.minimum.accumulate(back - s) + s
@@ -261,8 +243,7 @@ def stoppable(gain: FloatArray, blocks: int, seen: Array) -> FloatArray:
 def move_times(
     length: FloatArray, accel: FloatArray, x0: FloatArray, peak: FloatArray, x1: FloatArray
 ) -> FloatArray:
-    """(n,) times of blocks of a length from x0 over a peak to x1, squares of speeds, with constant accel,
-    (n,) all."""
+    """(n,) times of blocks from x0 over a peak to x1, squares of speeds, with constant accel, (n,) all."""
     v0, v, v1 = np.sqrt(x0), np.sqrt(np.maximum(peak, np.maximum(x0, x1))), np.sqrt(x1)
     even = np.maximum(length - (2.0 * v * v - x0 - x1) / (2.0 * accel), 0.0)  # way without acceleration
     times: FloatArray = (2.0 * v - v0 - v1) / accel + even / np.maximum(v, STANDING)

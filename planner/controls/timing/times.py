@@ -45,29 +45,21 @@ _JOINING = re.compile(rb"^[^(;\n]*?[Gg]64[^(;\n]*?[Qq][ \t]*(\d*\.?\d+)", re.MUL
 
 @dataclass(frozen=True, kw_only=True)
 class ControlTimes:
-    """What a control takes for a program.
+    """What a control takes for a program."""
 
-    control    : its name
-    seconds    : in all, dwells included [s]
-    dwells     : of that, standing still [s]
-    moves      : that its planner gets
-    tools, operations, layers : seconds by name, in the order of the program; empty where there are none
-    assumed    : sentences
-    """
-
-    control: str
-    seconds: float
-    dwells: float
-    moves: int
+    control: str  # its name
+    seconds: float  # in all, dwells included
+    dwells: float  # of that, standing still [s]
+    moves: int  # that its planner gets
+    # seconds by name, in the order of the program; empty where there are none
     tools: dict[str, float] = field(default_factory=dict)
     operations: dict[str, float] = field(default_factory=dict)
     layers: dict[str, float] = field(default_factory=dict)
-    assumed: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()  # sentences
 
 
 def control_named(name: str | None, machine: Machine) -> str:
-    """The control to be timed: the one that is named, or that of the machine. Raises InputError where there is no model of
-    it."""
+    """The control to be timed, named or the machine's. Raises InputError where there is no model of it."""
     found = name or (machine.control.name if machine.control is not None else None)
     if found not in TIMED:
         what = "the machine names no control" if found is None else f"there is no model of {found}"
@@ -91,7 +83,8 @@ def control_times(
     toolpath = toolpath_from_program(program, machine, tolerance)
     text = own_text(program) or b""
     timed = _on_linuxcnc if control == LINUXCNC else _on_the_path
-    of_block, moves, assumed = timed(program, toolpath, machine, control, text)
+    block, found, moves, assumed = timed(program, toolpath, machine, control, text)
+    of_block = np.bincount(block, weights=found, minlength=len(program)).astype(np.float64)
     dwells = float(toolpath.dwell.sum())
     np.add.at(of_block, toolpath.block[np.maximum(np.arange(len(toolpath.dwell)) - 1, 0)], toolpath.dwell)
     operations, layers = named_parts(program, text)
@@ -108,8 +101,8 @@ def control_times(
 
 
 def standing(program: Program, block: Array, *, switches: bool) -> Array:
-    """(n+1,) where the motion stands of moves that belong to blocks `block` (n,), not decreasing; with the switches of
-    spindle and coolant, if these hold it up."""
+    """(n+1,) where the motion stands of moves that belong to blocks `block` (n,), not decreasing; at the
+    switches of spindle and coolant too, if these hold it up."""
     still = np.flatnonzero(np.isin(program.kind, (Kind.DWELL, Kind.STOP)))
     if switches:
         at, code = codes_of(program, "M")
@@ -119,23 +112,23 @@ def standing(program: Program, block: Array, *, switches: bool) -> Array:
     return stands
 
 
-def _on_the_path(
-    program: Program, toolpath: Toolpath, machine: Machine, name: str, text: bytes
-) -> tuple[FloatArray, int, tuple[str, ...]]:
-    """(B,) seconds by block, moves, and what is assumed, of controls that stay on the path."""
+_Timed = tuple[
+    Array, FloatArray, int, tuple[str, ...]
+]  # block and seconds (n,) of moves, how many, what is assumed
+
+
+def _on_the_path(program: Program, toolpath: Toolpath, machine: Machine, name: str, text: bytes) -> _Timed:
+    """The moves on controls that stay on the path."""
     control = CONTROLS[name]
     points, segment = control_points(toolpath, control)
-    feed = toolpath.feed[segment]
+    feed, block = toolpath.feed[segment], toolpath.block[segment]
     if control.rapid_feed:
-        in_force = feed_in_force(program, text)
-        feed = np.where(toolpath.rapid[segment], in_force[toolpath.block[segment]], feed)
-    stands = standing(program, toolpath.block[segment], switches=name != "klipper")
+        feed = np.where(toolpath.rapid[segment], feed_in_force(program, text)[block], feed)
+    stands = standing(program, block, switches=name != "klipper")
     found = predicted_times(points, feed, stands, machine, toolpath.axes, control)
-    times = np.bincount(toolpath.block[segment], weights=found, minlength=len(program)).astype(np.float64)
-    given = machine.control
-    own = given is not None and given.name == name
+    own = machine.control is not None and machine.control.name == name
     assumed = () if own else (f"{name}'s defaults: the machine says nothing of {name}'s planner",)
-    return times, len(segment), assumed
+    return block, found, len(segment), assumed
 
 
 def control_points(toolpath: Toolpath, control: Control) -> tuple[FloatArray, Array]:
@@ -150,10 +143,8 @@ def control_points(toolpath: Toolpath, control: Control) -> tuple[FloatArray, Ar
     return np.vstack([toolpath.start[:1], ends]), segment
 
 
-def _on_linuxcnc(
-    program: Program, toolpath: Toolpath, machine: Machine, name: str, text: bytes
-) -> tuple[FloatArray, int, tuple[str, ...]]:
-    """(B,) seconds by block, moves, and what is assumed, of LinuxCNC."""
+def _on_linuxcnc(program: Program, toolpath: Toolpath, machine: Machine, name: str, text: bytes) -> _Timed:
+    """The moves on LinuxCNC."""
     stands = standing(program, toolpath.block, switches=True)
     mode = program.path_control[toolpath.block]
     stands[1:] |= mode == PathControl.EXACT_STOP
@@ -165,14 +156,12 @@ def _on_linuxcnc(
     kept = linuxcnc.joined_moves(points, feed, alone, stands, q)
     last = kept[1:] - 1  # move that each kept one ends with
     bends = _with_arcs(linuxcnc.lines(points[kept]), program, toolpath, last)
-    found = linuxcnc.linuxcnc_times(
-        points[kept], feed[last], stands[kept], machine, toolpath.axes, p[last[:-1]], bends
-    )
-    times = np.bincount(toolpath.block[last], weights=found, minlength=len(program)).astype(np.float64)
+    moves = points[kept], feed[last], stands[kept]
+    found = linuxcnc.linuxcnc_times(*moves, machine, toolpath.axes, p[last[:-1]], bends)
     blends = mode == PathControl.BLEND
     without = bool(blends.any() and np.isnan(program.tolerance[toolpath.block[blends]]).all())
     said = f"G64 P{float(toolpath.tolerance[-1]):g}: the program says no P, LinuxCNC's own G64 without P blends further"
-    return times, len(kept) - 1, (said,) if without else ()
+    return toolpath.block[last], found, len(kept) - 1, (said,) if without else ()
 
 
 def _with_arcs(lines: linuxcnc.Bends, program: Program, toolpath: Toolpath, segment: Array) -> linuxcnc.Bends:
@@ -192,20 +181,13 @@ def _with_arcs(lines: linuxcnc.Bends, program: Program, toolpath: Toolpath, segm
 def _arcs_of_curves(program: Program, toolpath: Toolpath) -> FloatArray:
     """(M,) into how many arcs LinuxCNC cuts segments: 1, and of a spline its share of `ARCS_OF_POINT` times its control
     points, as many as pieces and the degree."""
-    splines, blocks = program.splines, len(program)
+    splines, block, blocks = program.splines, toolpath.block, len(program)
     third = splines.points[:, 3] - splines.points[:, 0] - 3.0 * (splines.points[:, 2] - splines.points[:, 1])
     points = np.bincount(splines.block, minlength=blocks).astype(np.float64)
-    np.maximum.at(
-        degree := np.full(blocks, 2.0),
-        splines.block,
-        np.where((abs(third) > QUADRATIC).any(axis=1), 3.0, 2.0),
-    )
-    share = (
-        toolpath.length
-        / np.bincount(toolpath.block, weights=toolpath.length, minlength=blocks)[toolpath.block]
-    )
-    arcs: FloatArray = ARCS_OF_POINT * (points + degree)[toolpath.block] * share
-    return np.where(toolpath.curve >= 0, arcs, 1.0)
+    degree = np.full(blocks, 2.0)
+    np.maximum.at(degree, splines.block, np.where((abs(third) > QUADRATIC).any(axis=1), 3.0, 2.0))
+    share = toolpath.length / np.bincount(block, weights=toolpath.length, minlength=blocks)[block]
+    return np.where(toolpath.curve >= 0, ARCS_OF_POINT * (points + degree)[block] * share, 1.0)
 
 
 def _joining(program: Program, toolpath: Toolpath, text: bytes) -> float:
@@ -219,9 +201,9 @@ def _joining(program: Program, toolpath: Toolpath, text: bytes) -> float:
 
 def feed_in_force(program: Program, text: bytes) -> FloatArray:
     """(B,) the F in force on each block [mm/s]: of the last feed move or F word up to its line."""
-    number = _line_number(text)
-    scale = np.array([MM_PER_INCH if one[1] == b"20" else 1.0 for one in UNIT_WORD.finditer(text)])
-    unit_at = np.array([number(one) for one in UNIT_WORD.finditer(text)])
+    number, units = _line_number(text), [*UNIT_WORD.finditer(text)]
+    scale = np.array([MM_PER_INCH if one[1] == b"20" else 1.0 for one in units])
+    unit_at = np.array([number(one) for one in units])
     words = [(number(one), float(one[1])) for one in _F_WORD.finditer(text)]
     line, value = np.array(words).reshape(-1, 2).T
     unit = np.append(1.0, scale)[np.searchsorted(unit_at, line, side="right")]
@@ -256,24 +238,20 @@ def tools_of(program: Program) -> list[str] | None:
 def named_parts(program: Program, text: bytes) -> tuple[list[str] | None, list[str] | None]:
     """(B,) the operation and the layer of each block; None where the text names none."""
     number = _line_number(text)
-    said = [
-        (number(one), name)
-        for one in _COMMENT.finditer(text)
-        if (name := (one[1] or one[2] or b"").decode("utf-8", "replace").strip())
-    ]
+    comments = ((number(one), one[1] or one[2] or b"") for one in _COMMENT.finditer(text))
+    texts = [(line, words.decode("utf-8", "replace")) for line, words in comments]
+    said = [(line, name.strip()) for line, name in texts if name.strip()]
     types = [(line, name[5:]) for line, name in said if name.startswith("TYPE:")]
     marked = [(line, found[1]) for line, name in said if (found := _LAYER.match(name))]
     layers = [(line, f"layer {k if of is None else of}") for k, (line, of) in enumerate(marked, start=1)]
     plain = [] if layers else said
-    return tuple(_at_blocks(program, found) for found in (types or plain, layers))  # type: ignore[return-value]
 
+    def at_blocks(named: list[tuple[int, str]]) -> list[str] | None:
+        names = ["", *(name for _, name in named)]
+        found = np.searchsorted([line for line, _ in named], program.line, side="left")
+        return [names[k] for k in found.tolist()] if named else None
 
-def _at_blocks(program: Program, named: list[tuple[int, str]]) -> list[str] | None:
-    if not named:
-        return None
-    names = ["", *(name for _, name in named)]
-    found = np.searchsorted([line for line, _ in named], program.line, side="left")
-    return [names[k] for k in found.tolist()]
+    return at_blocks(types or plain), at_blocks(layers)
 
 
 def by_name(seconds: FloatArray, names: list[str] | None) -> dict[str, float]:

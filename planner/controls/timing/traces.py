@@ -39,11 +39,7 @@ LIKE = 1e-3  # of its length: how far a stroke may be from its shape, rms, beyon
 PLATEAU = 1.1  # how much longer one average must be than the next, for a plateau at its limit
 SURE = 4.0  # standard deviations of a time that is known
 AGREE = 0.9  # strokes that are as fast as this share of the 90th percentile agree on a limit
-STARTS = (
-    (0.7, 0.25, 0.05),
-    (0.5, 0.3, 0.2),
-    (0.5, 0.48, 0.02),
-)  # T1, T2, T3 over the time of a stroke, to begin with
+STARTS = (0.7, 0.25, 0.05), (0.5, 0.3, 0.2), (0.5, 0.48, 0.02)  # T1, T2, T3 of a stroke's time, to begin with
 _PERIOD = re.compile(r"#?\s*Sampling period is (\d+) n", re.IGNORECASE)
 _AXIS = re.compile(
     r"(?:.*?(?:axis|joint)[._])?([xyzabcuvw]|\d)(?:[._ -]*(?:motor[._-])?pos.*|\s*\[?(?:mm|deg)?\]?)"
@@ -78,31 +74,26 @@ def read_trace(path: str | Path) -> Trace:
     except (OSError, EOFError) as fault:
         raise InputError(f"the file cannot be read: {fault}", source=source) from fault
     if b"\0" in data:
-        raise InputError(
-            "a binary file; a trace is CSV, a log of halscope or Klipper's motion log", source=source
-        )
+        said = "a binary file; a trace is CSV, a log of halscope or Klipper's motion log"
+        raise InputError(said, source=source)
     if data.lstrip()[:1] == b"{":
         return _of_klipper(data, source)
     lines = data.decode("utf-8", errors="replace").splitlines()
     period = _PERIOD.match(lines[0]) if lines else None
-    first = 1 if period else 0
-    while first < len(lines) and not lines[first].strip():
-        first += 1
-    if first >= len(lines):
+    first = next((k for k in range(1 if period else 0, len(lines)) if lines[k].strip()), None)
+    if first is None:
         raise InputError("the trace is empty", source=source)
     mark = next((c for c in ";\t," if c in lines[first]), None)
-    names = lines[first].split(mark)
-    named = mark is None  # the older halscope has a name before each number
-    names, columns, first = (
-        (names[::2], range(1, len(names), 2), first) if named else (names, None, first + 1)
-    )
+    names, columns = lines[first].split(mark), None
+    if mark is None:  # the older halscope has a name before each number
+        names, columns = names[::2], range(1, len(names), 2)
+    else:
+        first += 1
     try:
         table = np.loadtxt(lines[first:], delimiter=mark, usecols=columns, ndmin=2)
     except ValueError as fault:
-        row = re.search(r"at row (\d+)", str(fault))
-        line = (
-            first + int(row[1]) + ("changed" not in str(fault)) if row else None
-        )  # which numpy counts from 1
+        row = re.search(r"at row (\d+)", str(fault))  # which numpy counts from 1
+        line = first + int(row[1]) + ("changed" not in str(fault)) if row else None
         raise InputError(re.split(";| at row", str(fault))[0], source=source, line=line) from None
     if len(table) < LEAST or table.shape[1] != len(names):
         said = f"{len(table)} samples of {table.shape[1]} numbers and {len(names)} names"
@@ -121,9 +112,8 @@ def _of_columns(names: list[str], table: FloatArray, period: re.Match[str] | Non
     if not position or not (times or period):
         missing = "no column of an axis" if not position else "no column t"
         needed = "t [s] and x, y, ... [mm], or of halscope joint.0.motor-pos-cmd or axis.x.pos-cmd"
-        raise InputError(
-            f"{missing}; found are {', '.join(names)}; needed are {needed}", source=source, line=1
-        )
+        said = f"{missing}; found are {', '.join(names)}; needed are {needed}"
+        raise InputError(said, source=source, line=1)
     unit = 1e-9 * int(period[1]) if period else 1e-3 if "ms" in names[times[0]] else 1.0
     t: FloatArray = (np.arange(len(table), dtype=np.float64) if period else table[:, times[0]]) * unit
     if late := np.flatnonzero(np.diff(t) <= 0.0).tolist():
@@ -135,12 +125,8 @@ def _of_klipper(data: bytes, source: str) -> Trace:
     """The trace of a motion log: pieces (time, duration, speed, acceleration, place, direction)."""
     try:
         messages = [json.loads(part) for part in data.split(b"\x03") if part.strip()]
-        pieces = [
-            row
-            for one in messages
-            if one.get("q") == "trapq:toolhead"
-            for row in one.get("params", one)["data"]
-        ]
+        moves = [one.get("params", one)["data"] for one in messages if one.get("q") == "trapq:toolhead"]
+        pieces = [row for data in moves for row in data]
         begin, lasts, speed, accel = np.array([row[:4] for row in pieces], dtype=np.float64).reshape(-1, 4).T
         place, way = (np.array([row[k] for row in pieces], dtype=np.float64) for k in (4, 5))
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as fault:
@@ -155,14 +141,6 @@ def _of_klipper(data: bytes, source: str) -> Trace:
     return Trace(t=t - t[0], position=dict(zip("xyz", at.T, strict=False)), source=source)
 
 
-def _smoothed(t: FloatArray, x: FloatArray) -> FloatArray:
-    """(T,) the speed, by parabolas through `WINDOW` samples [mm/s]."""
-    from scipy.signal import savgol_filter  # 0.2 s
-
-    speed: FloatArray = savgol_filter(x, WINDOW, 2, deriv=1, delta=float(np.median(np.diff(t))))
-    return speed
-
-
 def _noise(x: FloatArray) -> float:
     """Standard deviation of the noise of samples (T,), by their third differences: 1 + 9 + 9 + 1 of its square [mm]."""
     return float(1.4826 * np.median(np.abs(np.diff(x, 3))) / np.sqrt(20.0)) if len(x) > 3 else 0.0
@@ -172,8 +150,11 @@ def _moving(t: FloatArray, x: FloatArray) -> list[tuple[int, int]]:
     """First and last sample of the strokes of an axis: of one sign of its speed."""
     if len(x) < LEAST:
         return []
-    speed = _smoothed(t, x)
-    top, sd = float(np.abs(speed).max()), np.sqrt(12.0 / WINDOW**3) * _noise(x) / float(np.median(np.diff(t)))
+    from scipy.signal import savgol_filter  # 0.2 s
+
+    period = float(np.median(np.diff(t)))
+    speed = savgol_filter(x, WINDOW, 2, deriv=1, delta=period)  # by parabolas
+    top, sd = float(np.abs(speed).max()), np.sqrt(12.0 / WINDOW**3) * _noise(x) / period
     if top <= 2.0 * SURE * sd or np.ptp(x) <= 0.0:
         return []
     way = np.where(np.abs(speed) > max(STILL * top, SURE * sd), np.sign(speed), 0.0)
@@ -186,12 +167,10 @@ def limits_of(
     traces: Sequence[Trace], machine: Machine
 ) -> tuple[Machine, tuple[tuple[str, float, float], ...], list[str]]:
     """The machine with the limits of its axes that traces show, these (name, before, found), and what they do not show, one
-    sentence each.
+    sentence each. Raises InputError where no axis has a stroke that can be used.
 
     A velocity is that of the fastest strokes that keep one: of rapids that are long enough it is the limit. A jerk, T3 =
     acceleration / jerk, may as well be a moving average of that length behind the control.
-
-    Raises InputError where no axis has a stroke that can be used.
     """
     data, settings, said, seen = machine.model_dump(exclude_defaults=True), [], [], 0
     for letter, axis in machine.axes.items():
@@ -210,14 +189,11 @@ def limits_of(
                 data["axes"][letter][name] = value = _agreed(values[plateau])
                 settings.append((f"{letter}.{name}", getattr(axis, name), value))
             elif len(length):
-                said.append(
-                    f"{letter}.{name} {getattr(axis, name):g} stays: no stroke of the {len(length)} shows it"
-                )
+                value = getattr(axis, name)
+                said.append(f"{letter}.{name} {value:g} stays: no stroke of the {len(length)} shows it")
     if not seen:
-        raise InputError(
-            "no axis goes straight from rest to rest, or to and fro, in what was recorded: record x.nc, y.nc, z.nc of --write",
-            source=traces[0].source,
-        )
+        text = "no axis goes straight from rest to rest, or to and fro, in what was recorded: record x.nc, y.nc, z.nc of --write"
+        raise InputError(text, source=traces[0].source)
     return machine_from_dict(data), tuple(settings), said
 
 
@@ -228,10 +204,7 @@ def _agreed(values: FloatArray) -> float:
 
 def strokes(t: FloatArray, x: FloatArray) -> FloatArray:
     """(n, 4) length of the strokes of an axis that have the shape of limits [mm], and T1 >= T2 >= T3 of them [s]; NaN for a
-    T3 that the samples do not tell from nothing.
-
-    t, x : (T,) times [s], places [mm]
-    """
+    T3 that the samples do not tell from nothing. Of times t and places x (T,) [s, mm]."""
     runs, noise = _moving(t, x), _noise(x)
     found = []
     for k in np.unique(np.linspace(0, len(runs) - 1, min(MOST, len(runs))).astype(int)) if runs else []:
@@ -239,10 +212,9 @@ def strokes(t: FloatArray, x: FloatArray) -> FloatArray:
         room = LEAST + (last - first) // 4  # of the standstill on either side
         begin = max(runs[k - 1][1] + 1 if k else 0, first - room)
         end = min(runs[k + 1][0] if k + 1 < len(runs) else len(x), last + room)
-        if end - begin >= LEAST and (
-            one := _stroke(t[begin:end] - t[first], x[begin:end], t[last] - t[first], noise)
-        ):
-            found.append(one)
+        if end - begin >= LEAST:
+            one = _stroke(t[begin:end] - t[first], x[begin:end], t[last] - t[first], noise)
+            found += [one] if one else []
     return np.array(found).reshape(-1, 4)
 
 

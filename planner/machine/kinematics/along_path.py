@@ -1,5 +1,5 @@
-"""The joints along a path of the tip, with their first three derivatives, and the tip along one of the
-joints.
+"""The joints along a path of the tip, and the tip along one of the joints, with their first three
+derivatives.
 
 A path gives position and derivatives of all its axes, p(s) and the angles; q(s) = f(p(s)) then has the
 derivatives that the chain rule gives to third order (base/series.py), exact but for rounding.
@@ -28,8 +28,7 @@ def joints_along(
 
 
 def points_along(chain: Chain, axes: tuple[str, ...], motion: FloatArray, radius: float = 1.0) -> FloatArray:
-    """(4, n, A) the controlled point where `motion` (4, n, A) is that of the joints; the rest as in
-    `joints_along`."""
+    """(4, n, A) the controlled point for a `motion` (4, n, A) of the joints; else as `joints_along`."""
     return _along(chain.point, axes, motion, radius)
 
 

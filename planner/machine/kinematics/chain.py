@@ -54,8 +54,7 @@ class Kinematics(Protocol):
         ...
 
     def joints(self, place: dict[str, Any]) -> dict[str, Any]:
-        """The linear joints x, y, z at a place: numbers, arrays (n,), or series of derivatives, by their
-        letters [mm, rad]."""
+        """The linear joints by their letters: numbers, arrays (n,), or series of derivatives [mm, rad]."""
         ...
 
 
@@ -76,8 +75,7 @@ class Chain:
         return dataclasses.replace(self, length=length)
 
     def joints(self, place: dict[str, Any]) -> dict[str, Any]:
-        """q from p and the angles; values are numbers, arrays (n,), series or casadi expressions [mm,
-        rad]."""
+        """q from p and the angles: numbers, arrays (n,), series or casadi expressions [mm, rad]."""
         p = (place["x"], place["y"], place["z"])
         tilt, turn = self._angles(place)
         if self.data.type == HEAD_HEAD:
@@ -92,8 +90,7 @@ class Chain:
         return dict(zip(LINEAR, q, strict=True))
 
     def point(self, place: dict[str, Any]) -> dict[str, Any]:
-        """p from the joints, x, y, z and the rotary ones, all alike: numbers, arrays (n,) or series [mm,
-        rad]."""
+        """p from the joints, x, y, z and the rotary ones: numbers, arrays (n,) or series [mm, rad]."""
         q = (place["x"], place["y"], place["z"])
         tilt, turn = self._angles(place)
         if self.data.type == HEAD_HEAD:
@@ -108,8 +105,7 @@ class Chain:
         return dict(zip(LINEAR, p, strict=True))
 
     def direction(self, place: dict[str, Any]) -> Vector:
-        """Unit vector along the tool, from its tip to the spindle, seen from the workpiece; angles as
-        numbers, arrays (n,) or series."""
+        """Unit vector along the tool, from its tip to the spindle, seen from the workpiece."""
         tilt, turn = self._angles(place)
         up = (0.0, 0.0, 1.0)
         if self.data.type == HEAD_HEAD:
@@ -121,9 +117,8 @@ class Chain:
         c is 0 at the pole. c lies within -pi to pi, the tilt of the first pair within 0 to pi, that of the
         second is its negative."""
         tilt = np.arctan2(np.hypot(direction[:, 0], direction[:, 1]), direction[:, 2])
-        angles = [sign * tilt for sign in (1.0, -1.0)]
         pairs = []
-        for angle in angles:
+        for angle in (tilt, -tilt):
             # with c = 0 the direction's x and y, for a tilt that is no pole
             place = {self.data.rotary[0]: angle, "c": 0.0}
             x0, y0, _ = (np.broadcast_to(v, tilt.shape) for v in self.direction(place))
@@ -164,9 +159,8 @@ def kinematics_of(machine: Machine, tool_length: float | None = None) -> Chain:
     """The kinematics of a machine file, with a tool of that length [mm], or that of the table [kinematics].
     Raises InputError if the machine has none."""
     if machine.kinematics is None:
-        raise InputError(
-            f"machine '{machine.name}' has no kinematics: the tool centre point needs a table [kinematics] with type and offsets"
-        )
+        said = "the tool centre point needs a table [kinematics] with type and offsets"
+        raise InputError(f"machine '{machine.name}' has no kinematics: {said}")
     length = machine.kinematics.tool_length if tool_length is None else tool_length
     return Chain(data=machine.kinematics, length=length)
 

@@ -85,8 +85,7 @@ def _nearest(angle: float, to: float) -> float:
 def _check_between(
     chain: Chain, angles: FloatArray, unit: FloatArray, tolerance: float, lines: Sequence[int] | None
 ) -> None:
-    """Raise InputError where the axes moving in proportion take the tool out of the plane of two
-    directions."""
+    """Raise InputError where the axes take the tool out of the plane of two directions."""
     tilt, turn = chain.data.rotary
     normal = np.cross(unit[:-1], unit[1:])
     sine = np.linalg.norm(normal, axis=1)

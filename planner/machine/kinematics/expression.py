@@ -37,9 +37,12 @@ class Expression:
             table = np.stack(np.broadcast_arrays(*columns))
             found = self._called(self._value, table.reshape(len(columns), -1))
             return {a: found[k].reshape(table.shape[1:]) for k, a in enumerate(LINEAR)}
-        like = next(column.derivatives for column in columns if isinstance(column, Series))
-        constant = np.zeros_like(like)
-        jets = [c.derivatives if isinstance(c, Series) else _constant(c, constant) for c in columns]
+        jets = np.zeros((len(columns), *next(c.derivatives.shape for c in columns if isinstance(c, Series))))
+        for jet, column in zip(jets, columns, strict=True):
+            if isinstance(column, Series):
+                jet[:] = column.derivatives
+            else:
+                jet[0] = column
         found = self._called(self._jets, np.concatenate(jets))
         return {a: Series(found[4 * k : 4 * k + 4]) for k, a in enumerate(LINEAR)}
 
@@ -62,15 +65,13 @@ def expression(axes: str, joints: Callable[..., Sequence[Any]]) -> Expression:
     casadi = import_needed("casadi", "kinematics as an expression")
     letters = tuple(axes)
     if letters[:3] != LINEAR or len(set(letters)) < len(letters) or not set(letters[3:]) <= set(ROTARY_AXES):
-        raise InputError(
-            f"kinematics: axes '{axes}'; x, y and z come first, then letters of {', '.join(ROTARY_AXES)}"
-        )
+        known = ", ".join(ROTARY_AXES)
+        raise InputError(f"kinematics: axes '{axes}'; x, y and z come first, then letters of {known}")
     p, t = casadi.SX.sym("p", len(letters)), casadi.SX.sym("t")
     given = joints(*casadi.vertsplit(p))
     if len(given) != len(LINEAR):
-        raise InputError(
-            f"kinematics: the function returns {len(given)} joints; it must return three: x, y, z"
-        )
+        said = f"kinematics: the function returns {len(given)} joints"
+        raise InputError(f"{said}; it must return three: x, y, z")
     q = casadi.vertcat(*given)
     try:
         value = casadi.Function("joints", [p], [q])
@@ -86,9 +87,3 @@ def expression(axes: str, joints: Callable[..., Sequence[Any]]) -> Expression:
             rows.append(casadi.substitute(row, t, 0.0))
             row = casadi.jacobian(row, t)
     return Expression(letters, value, casadi.Function("jets", [casadi.vec(taylor)], [casadi.vertcat(*rows)]))
-
-
-def _constant(value: Any, like: FloatArray) -> FloatArray:
-    line = like.copy()
-    line[0] = value
-    return line

@@ -17,7 +17,7 @@ from planner.base.errors import InputError
 from planner.machine import Axis, Machine
 from planner.machine.kinematics.along_path import in_rad
 from planner.machine.kinematics.chain import LINEAR, Kinematics, kinematics_of
-from planner.machine.user_limit import JointLimit, Place
+from planner.machine.user_limit import QUANTITIES, JointLimit, Place
 
 # Limits of the tip's coordinates: so many times the largest of the linear joints [-]. Splines are shaped by
 # them, not by those of the joints: with 10 a path of three axes is planned 3 % slower than by a machine
@@ -57,17 +57,13 @@ def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: floa
     for letter in found.axes:
         machine.limits("velocity", (letter,))
     radius = machine.radius
-    linear = [machine.axes[letter] for letter in LINEAR]
     # travel is that of the joints
     own = {"travel_min": None, "travel_max": None}
     axes = {a: axis.model_copy(update=own) if a in LINEAR else axis for a, axis in machine.axes.items()}
     if wide is not None:
-        free = Axis(
-            velocity=wide * max(axis.velocity for axis in linear),
-            acceleration=wide * max(axis.acceleration for axis in linear),
-            jerk=wide * max(axis.jerk for axis in linear),
-        )
-        axes = {letter: free if letter in LINEAR else axis for letter, axis in axes.items()}
+        linear = [machine.axes[letter] for letter in LINEAR]
+        free = Axis(**{name: wide * max(getattr(axis, name) for axis in linear) for name in QUANTITIES})
+        axes |= dict.fromkeys(LINEAR, free)
     joints = [LinearJoint(letter, machine.axes[letter], found, radius) for letter in LINEAR]
     # joints that run on cubics do not lead the tip along one: between setpoints it is taken to run along its
     # chord

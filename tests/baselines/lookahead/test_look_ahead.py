@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import needs_ruckig
+from oracles import entry_length, needs_ruckig
 
 from planner.base.arrays import FloatArray
 from planner.baselines.lookahead.look_ahead import capped, look_ahead, moves, needed, swept
@@ -80,7 +80,7 @@ def corner_of(passage: np.recarray, i: int) -> tuple[float, float, float]:
         return 0.0, float(kinematic.approach(V, p, q)), float(np.sum(kinematic.phase_times(V, p, q)))
     if kind == JointKind.ENTRY and V > 0:
         A = float(kinematic.entry_acceleration(V, p, q))
-        return A, float(kinematic.entry_length(V, p, q)), 2 * V / A
+        return A, float(entry_length(V, p, q)), 2 * V / A
     return 0.0, 0.0, 0.0
 
 

@@ -74,6 +74,7 @@ class BlockTable:
 
     def add(self, kind: Kind, line: int, state: State) -> None:
         """Append a block that ends where the tool is."""
+        self.make_room(1)
         block, k = self.block, self.blocks
         block.kind[k] = kind
         block.end[k] = state.place
@@ -106,6 +107,7 @@ class BlockTable:
 
     def add_event(self, letter: str, value: float, line: int) -> None:
         """Append an event before the next block."""
+        self.make_room(1)
         event, k = self.event, self.events
         event.block[k] = self.blocks
         event.line[k] = line

@@ -241,7 +241,6 @@ class Cutter:
         """To the offset start of the next move: about the corner, or straight before a rapid."""
         state = self._state
         place = self._at(end, state.place)
-        self._table.make_room(2)
         if kind == Kind.RAPID:
             state.actual = place
             self._table.add(Kind.RAPID, line, state)
@@ -264,7 +263,6 @@ class Cutter:
         begin, before = self._plane(state.place), state.place
         state.position[:] = target
         state.actual = self._at(side.end, target)
-        table.make_room(2)
         row, arc = table.blocks, -1
         if kind == Kind.ARC:
             arc = len(table.arcs)
@@ -305,7 +303,6 @@ class Cutter:
         place = self._plane(state.place)
         state.position[:] = target
         state.actual = self._at(place, target)
-        self._table.make_room(1)
         if self._open is not None and self._open.row < 0:
             self._open.row = self._table.blocks
         self._table.add(kind, line, state)

@@ -175,7 +175,6 @@ def cut_thread(state: State, table: BlockTable, block: Block, findings: Findings
 
 def stop(state: State, table: BlockTable, line: int) -> None:
     """A full stop before or after a cut."""
-    table.make_room(1)
     table.add(Kind.STOP, line, state)
     state.in_thread = False
 
@@ -185,7 +184,6 @@ def _cut(state: State, table: BlockTable, line: int, target: FloatArray, feed: f
         stop(state, table, line)
     programmed, state.feed = state.feed, feed
     state.position[:], state.actual = target, None
-    table.make_room(1)
     table.synchronised.append(table.blocks)
     table.add(Kind.LINE, line, state)
     state.feed, state.in_thread = programmed, True
@@ -196,7 +194,6 @@ def _rapid(state: State, table: BlockTable, line: int, place: FloatArray) -> Non
         stop(state, table, line)
     if (place != state.place).any():
         state.position[:], state.actual = place, None
-        table.make_room(1)
         table.add(Kind.RAPID, line, state)
 
 

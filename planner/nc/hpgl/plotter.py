@@ -278,10 +278,9 @@ class _Run:
         self.table.add_arc(arc, _NORMAL, self._ready(at), self.state)
 
     def _ready(self, at: int) -> int:
-        """Bring the state to where the pen is, and make room for a block and an event; returns the line."""
+        """Bring the state to where the pen is; returns the line."""
         self.state.position[:2] = self.position
         self.state.feed = self.speed_of_pen.get(self.pen, self.speed)
-        self.table.make_room(1)
         return self._place(at)[0]
 
     def _add_event(self, letter: str, value: float, at: int) -> None:

@@ -45,19 +45,16 @@ _IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of
 
 
 class OpenArc(NamedTuple):
-    """An arc that does not close: its line, whether it would `otherwise`, whether I J K are not all 0."""
+    """An arc that does not close."""
 
     line: int
-    otherwise: bool
-    centred: bool
+    otherwise: bool  # with its centre read the other way it would
+    centred: bool  # I J K are not all 0
 
 
 class Interpreter:
     """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`,
-    `faults()`, `notes`.
-
-    Between two chunks `state` and `table` say where the program stands: what parameters of a program
-    ask for.
+    `faults()`, `notes`. Between two chunks `state` and `table` say where the program stands.
     """
 
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
@@ -65,7 +62,7 @@ class Interpreter:
         self.machine = machine
         state = state_of(machine, reading.ignore)
         state.strict, state.absolute_centre = reading.strict, reading.arc_centres == ABSOLUTE
-        self.tool_point = ToolPointSwitch.of(machine)
+        self.tool_point = ToolPointSwitch(machine)
         extruder, at_tip = machine is not None and EXTRUDER in machine.axes, self.tool_point.chain is not None
         self.ignored = IgnoredWords(reading, state.others, extruder=extruder, at_tip=at_tip)
         table = BlockTable(len(state.letters))

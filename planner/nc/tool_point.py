@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,17 +43,12 @@ class Switch(NamedTuple):
     length: float
 
 
-@dataclass
 class ToolPointSwitch:
     """Follows the switch through a program; does nothing on machines without kinematics."""
 
-    chain: Chain | None  # kinematics of the machine, or None
-    switches: list[Switch] = dataclasses.field(default_factory=list)  # so far
-
-    @classmethod
-    def of(cls, machine: Machine | None) -> ToolPointSwitch:
-        """The switch of a machine, with its kinematics if it has any."""
-        return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
+    def __init__(self, machine: Machine | None) -> None:
+        self.chain = kinematics_of(machine) if machine is not None and machine.kinematics else None
+        self.switches: list[Switch] = []  # so far
 
     def take(self, state: State, table: BlockTable, block: Block) -> None:
         """Follow the words of a block. Raises WordFault without kinematics, and for a tool off its axis."""
@@ -120,7 +114,7 @@ def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | Non
         return program
     first = _tool_of(program, switch.switches)
     whole = _with_axes(program, switch.chain.axes)
-    made = _Pieces(whole, on, tilted, switch.chain.with_tool(first.length), machine).program()
+    made = _in_pieces(whole, ~on & tilted, switch.chain.with_tool(first.length), machine.tolerance)
     off = int((~on & tilted & (program.kind == Kind.RAPID)).sum())
     text = f"line {first.line}: the tool centre point is on ({first.word}), x, y, z are of the tip of a tool of {first.length:g} mm"
     if off:
@@ -173,53 +167,41 @@ def _with_axes(program: Program, axes: tuple[str, ...]) -> Program:
     )
 
 
-class _Pieces:
-    """The blocks of a program as pieces whose ends are places of p."""
-
-    def __init__(self, program: Program, on: Array, tilted: Array, chain: Chain, machine: Machine):
-        self.whole, self.chain = program, chain
-        self.off = ~on & tilted
-        feed = np.flatnonzero(self.off & np.isin(program.kind, FEED_MOVES))
-        if len(feed):
-            text = (
-                "a feed move with the tool centre point off while a rotary axis is off 0: there only rapid moves (G0) are planned with "
-                f"it off ({len(feed):,} such moves); switch the tool centre point on before it (G43.4, M428, M128, TRAORI), or turn "
-                "the rotary axes to 0"
-            )
-            raise InputError(text, source=program.source, line=int(program.line[feed[0]]))
-        given = program.tolerance[np.isfinite(program.tolerance)]
-        self.within = CHORD_SHARE * min(machine.tolerance, float(given.min(initial=np.inf)))
-        self.end = program.end.copy()
-        self.end[self.off] = self._of(chain.point, program.end[self.off])
-
-    def _of(self, function: Callable[[dict[str, Any]], dict[str, Any]], places: FloatArray) -> FloatArray:
-        axes, found = self.whole.axes, places.copy()
-        new = function({letter: places[:, k] for k, letter in enumerate(axes)})
-        for letter in LINEAR:
-            found[:, axes.index(letter)] = new[letter]
-        return found
-
-    def program(self) -> Program:
-        """The program with these ends, its rapid moves of the joints in chords."""
-        whole = self.whole
-        rapids = np.flatnonzero(self.off & (whole.kind == Kind.RAPID)).tolist()
-        if not rapids:
-            return dataclasses.replace(whole, end=self.end)
-        ends = [self.end[k : k + 1] for k in range(len(whole))]
-        for k in rapids:
-            begin = self.end[k - 1] if k else whole.start
-            ends[k] = self._chords(self._of(self.chain.joints, begin[None])[0], whole.end[k])
-        block = np.repeat(np.arange(len(whole)), [len(pieces) for pieces in ends])
-        inner = np.append(block[1:] == block[:-1], False)
-        control = np.where(inner, PathControl.BLEND, whole.path_control[block])
-        return divided(whole, block, end=np.concatenate(ends), path_control=control)
-
-    def _chords(self, begin: FloatArray, end: FloatArray) -> FloatArray:
-        """(n, A) ends in p of chords of a straight line of the joints, left by at most `within`."""
-        for count in CHORDS.tolist():
+def _in_pieces(program: Program, off: Array, chain: Chain, tolerance: float) -> Program:
+    """The program with ends in p, its rapid moves of the joints, among the blocks `off` (B,), in chords."""
+    if not off.any():
+        return program
+    feed = np.flatnonzero(off & np.isin(program.kind, FEED_MOVES))
+    if len(feed):
+        text = (
+            "a feed move with the tool centre point off while a rotary axis is off 0: there only rapid moves (G0) are planned with "
+            f"it off ({len(feed):,} such moves); switch the tool centre point on before it (G43.4, M428, M128, TRAORI), or turn "
+            "the rotary axes to 0"
+        )
+        raise InputError(text, source=program.source, line=int(program.line[feed[0]]))
+    given = program.tolerance[np.isfinite(program.tolerance)]
+    within = CHORD_SHARE * min(tolerance, float(given.min(initial=np.inf)))
+    end = program.end.copy()
+    end[off] = _of(chain.point, program.axes, program.end[off])
+    ends = [end[k : k + 1] for k in range(len(program))]
+    for k in np.flatnonzero(off & (program.kind == Kind.RAPID)).tolist():
+        begin = _of(chain.joints, program.axes, (end[k - 1] if k else program.start)[None])
+        for count in CHORDS.tolist():  # a straight line of the joints
             share = np.linspace(0.0, 1.0, 2 * count + 1)[:, None]
-            places = self._of(self.chain.point, begin + share * (end - begin))
+            places = _of(chain.point, program.axes, begin + share * (program.end[k] - begin))
             bow = places[1::2] - 0.5 * (places[:-1:2] + places[2::2])
-            if float(np.linalg.norm(bow, axis=1).max()) <= self.within:
+            if float(np.linalg.norm(bow, axis=1).max()) <= within:
                 break
-        return places[2::2]
+        ends[k] = places[2::2]
+    block = np.repeat(np.arange(len(program)), [len(pieces) for pieces in ends])
+    inner = np.append(block[1:] == block[:-1], False)
+    control = np.where(inner, PathControl.BLEND, program.path_control[block])
+    return divided(program, block, end=np.concatenate(ends), path_control=control)
+
+
+def _of(function: Callable[[dict[str, Any]], Any], axes: tuple[str, ...], places: FloatArray) -> FloatArray:
+    """(n, A) places of the joints or of p from those (n, A) of the other."""
+    found, new = places.copy(), function({letter: places[:, k] for k, letter in enumerate(axes)})
+    for letter in LINEAR:
+        found[:, axes.index(letter)] = new[letter]
+    return found

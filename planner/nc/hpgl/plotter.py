@@ -20,18 +20,9 @@ from planner.machine import Machine, Plotter
 from planner.nc.arcs import Arc
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Fault, Notes
+from planner.nc.hpgl import instructions as written
 from planner.nc.hpgl.drawing import Point, Scaling, ScalingError, circle_through
-from planner.nc.hpgl.instructions import (
-    ALLOWED,
-    CHANGING,
-    FORMS,
-    IGNORED,
-    PAGE_ENDS,
-    REFUSED,
-    WITH_NUMBERS,
-    Instruction,
-    instructions,
-)
+from planner.nc.hpgl.instructions import FORMS, IGNORED, Instruction
 from planner.nc.program import Kind, Program
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State, state_of
@@ -57,7 +48,7 @@ def read_drawing(
     InputError for a file without any instruction."""
     run = _Run(data, machine, reading)
     found = 0
-    for instruction in instructions(data, run.report, run.note):
+    for instruction in written.instructions(data, run.report, run.note):
         run.execute(instruction)
         found += 1
     if not found and not run.reports:
@@ -102,8 +93,7 @@ class _Run:
 
     def faults(self) -> list[Fault]:
         """All faults in the order of the file."""
-        reports = sorted(self.reports)
-        return [Fault(*self._place(at), self._word(at, end), message) for at, end, message in reports]
+        return [Fault(*self._place(at), self._word(at, end), said) for at, end, said in sorted(self.reports)]
 
     def _word(self, at: int, end: int) -> str:
         text = self.data[at:end].decode("latin-1").strip()[:WORD_SHOWN]
@@ -142,23 +132,22 @@ class _Run:
     def _execute(self, it: Instruction) -> None:
         name, numbers = it.name, it.numbers
         form = FORMS.get(name)
-        known = self.strict or name in IGNORED or name in REFUSED or name == "SM"
+        no_symbol = name == "SM" and not it.text.strip(b"; \r\n")
+        known = self.strict or name in IGNORED or name in written.REFUSED or name == "SM"
         if (form is None or (name == "RT" and not form.fits(len(numbers)))) and not known:
             self.unknown.append(it.at)  # RT is an arc of HP's plotters, and something else of other makers
-            return
-        if form is None:
-            if name in IGNORED or (name == "SM" and not it.text.strip(b"; \r\n")):
-                if name in CHANGING or (name in WITH_NUMBERS and numbers):
-                    if self.strict:
-                        raise _NotDrawn(f"{IGNORED[name]} (assumed without --strict)")
-                    self.changing.setdefault(name, []).append(it.at)
-                    return
-                self.ignored.setdefault(name, []).append(it.at)
-                return
-            raise _NotDrawn(REFUSED.get(name, f"there is no such instruction; allowed are {ALLOWED}"))
-        if not form.fits(len(numbers)):
+        elif form is None and (name in IGNORED or no_symbol):
+            changes = name in written.CHANGING or (name in written.WITH_NUMBERS and numbers)
+            if changes and self.strict:
+                raise _NotDrawn(f"{IGNORED[name]} (assumed without --strict)")
+            (self.changing if changes else self.ignored).setdefault(name, []).append(it.at)
+        elif form is None:
+            allowed = f"there is no such instruction; allowed are {written.ALLOWED}"
+            raise _NotDrawn(written.REFUSED.get(name, allowed))
+        elif not form.fits(len(numbers)):
             raise _NotDrawn(f"{len(numbers)} numbers found; write {form}")
-        _EXECUTE[name](self, it)
+        else:
+            _EXECUTE[name](self, it)
 
     def _end_page(self, it: Instruction) -> None:
         self.ignored.setdefault(it.name, []).append(it.at)
@@ -255,11 +244,10 @@ class _Run:
             self.speed, self.speed_of_pen = speed, {}
 
     def _point(self, x: float, y: float, *, absolute: bool) -> Point:
-        unit = self.plotter.unit
+        unit, (fx, fy), (x0, y0) = self.plotter.unit, self.scaling.factor, self.position
         if absolute:
             x, y = self.scaling.place(x, y)
             return x * unit, y * unit
-        (fx, fy), (x0, y0) = self.scaling.factor, self.position
         return x0 + x * fx * unit, y0 + y * fy * unit
 
     def _go(self, end: Point, at: int) -> None:
@@ -274,8 +262,7 @@ class _Run:
             return
         self._begin_to_draw()
         self.position = end
-        arc = Arc(np.array([*centre, 0.0]), sweep)
-        self.table.add_arc(arc, _NORMAL, self._ready(at), self.state)
+        self.table.add_arc(Arc(np.array([*centre, 0.0]), sweep), _NORMAL, self._ready(at), self.state)
 
     def _ready(self, at: int) -> int:
         """Bring the state to where the pen is; returns the line."""
@@ -311,6 +298,6 @@ _EXECUTE: dict[str, Callable[[_Run, Instruction], None]] = {
     "SP": _Run._select_pen,
     "VS": _Run._select_speed,
     **dict.fromkeys(("IP", "SC", "DF"), _Run._scale),
-    **dict.fromkeys(PAGE_ENDS, _Run._end_page),
+    **dict.fromkeys(written.PAGE_ENDS, _Run._end_page),
     "IN": _Run._begin_anew,
 }

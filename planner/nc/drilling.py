@@ -181,10 +181,9 @@ def _check_words(state: State, block: Block, words: dict[str, float], findings: 
     """Raises WordFault for an impossible peck or dwell, and a spindle that does not turn as it must."""
     code, name = state.motion, f"G{codes.number(state.motion)}"
     if code in PECKING:
+        least = min(_infeeds(words, state)[c] for c in ("peck", "least"))
         text = f"{name} needs the depth of a peck as a Q word above 0"
-        block.require(
-            min(_infeeds(words, state)[c] for c in ("peck", "least")) > 0, text, "Q" * ("Q" in block.at)
-        )
+        block.require(least > 0, text, "Q" * ("Q" in block.at))
     text = "a dwell must not be negative; write its seconds, such as P0.5"
     block.require(code not in DWELLING or words["P"] >= 0, text, "P")
     if state.fanuc and code in TAPPING.keys() | STOPPING and (code in TAPPING or not state.spindle.turning):
@@ -206,10 +205,8 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
     absolute = state.absolute or state.fanuc
     clear = words["R"] + (0.0 if absolute else series.level)
     bottom = words["XYZ"[axis]] + (0.0 if absolute else clear)
-    what = f"G{codes.number(state.motion)} would begin at R = {clear:g}"
-    block.require(
-        bottom <= clear, f"{what}, below its depth {AXES[axis].upper()} = {bottom:g}; write R above it"
-    )
+    what = f"G{codes.number(state.motion)} would begin at R = {clear:g}, below its depth"
+    block.require(bottom <= clear, f"{what} {AXES[axis].upper()} = {bottom:g}; write R above it")
     return Hole(
         state.motion,
         (0.0, 0.0),

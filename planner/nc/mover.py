@@ -16,9 +16,7 @@ from planner.nc.state import NO_MOTION, REFUSED_MOTION, SYSTEMS, State, tool_nam
 
 # Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and
 # which are refused.
-_OFF = 400
-_LEFT = (410, 411)
-_DYNAMIC = (411, 421)
+_OFF, _LEFT, _DYNAMIC = 400, (410, 411), (411, 421)
 _REFUSED_GROUPS = ("plane", "work offset", "tool length", "path control", "retract mode")
 _REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)  # while it is on
 # G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may
@@ -49,12 +47,12 @@ def check_unchanged(state: State, block: Block) -> None:
 
 def check_offsets(state: State, block: Block, *, compensated: bool) -> None:
     """Raise WordFault for a D or H alone that would bring another offset in on Fanuc's controls."""
-    changed = {"cutter compensation", "tool length"} & block.g.keys()
+    if not state.fanuc or {"cutter compensation", "tool length"} & block.g.keys():
+        return
     for letter, code, on in (("H", "G43", bool(state.tool_offset.any())), ("D", "G41 or G42", compensated)):
         number = block.idle.get(letter, block.value.get(letter))
-        before = state.numbers.get(letter)
-        idle = state.fanuc and on and letter not in block.uses and not changed
-        if idle and number is not None and before is not None and number != before:
+        before = state.numbers.get(letter, number)
+        if on and letter not in block.uses and number is not None and number != before:
             text = f"{letter}{number:g} while {letter}{before:g} is in force: the control takes its offset from here on"
             raise block.fault(f"{text}; write {code} beside it", letter)
 
@@ -129,9 +127,8 @@ def go_to_switches(state: State, table: BlockTable, block: Block, findings: Find
     """Homing ($H, bare G28 of 3-D printers): `block.homing` goes to the position of G28, or machine zero."""
     if not block.homing:
         return
-    home = state.homes.get(280, np.zeros(3))
-    for letter in block.homing:
-        state.position["XYZ".index(letter)] = home["XYZ".index(letter)]
+    axes = ["XYZ".index(letter) for letter in block.homing]
+    state.position[axes] = state.homes.get(280, np.zeros(3))[axes]
     table.add(Kind.RAPID, block.line, state)
     text = "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not"
     findings.assume(text, block.line)
@@ -231,22 +228,22 @@ class Mover:
         state, cutter = self.state, self.cutter
         target = moves.target(state, block)
         kind = (Kind.RAPID, Kind.LINE)[state.motion]
+        surface = kind == Kind.LINE and auxiliary.on_surface(state)
         if kind == Kind.LINE:
             auxiliary.check_feed(state, block)
             if state.feed_mode == "inverse time":
                 auxiliary.feed_of_time(state, block, offsets.length_moved(state, target), self.findings)
-        if kind == Kind.LINE and auxiliary.on_surface(state):
+        if surface:
             offsets.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
             state.feed = auxiliary.surface_feed(state, max(map(abs, radii)), block.motion_word())
-            if cutter is None:
-                self._on_surface(block, target, *radii)
-                return
         if cutter is not None:
             cutter.line(target, kind, block.line)
-            return
-        state.position[:], state.actual = target, None
-        self.table.add(kind, block.line, state)
+        elif surface:
+            self._on_surface(block, target, *radii)
+        else:
+            state.position[:], state.actual = target, None
+            self.table.add(kind, block.line, state)
 
     def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
         """A straight move in parts, each with the feed of its larger radius."""

@@ -238,10 +238,9 @@ def path_control(state: State, block: Block, ignored: IgnoredWords, findings: Fi
     if "P" in block.value and code == 640:
         tolerance = block.value["P"]
         block.require(tolerance >= 0, "a tolerance must not be negative; write G64 P0.05", "P")
-        text = (
-            f"a tolerance must not be below {TOLERANCE_MIN:g} mm; write G64 P0.05, or G61 for the path itself"
-        )
-        block.require(tolerance == 0 or tolerance * state.unit >= TOLERANCE_MIN, text, "P")
+        least = f"a tolerance must not be below {TOLERANCE_MIN:g} mm"
+        enough = tolerance == 0 or tolerance * state.unit >= TOLERANCE_MIN
+        block.require(enough, f"{least}; write G64 P0.05, or G61 for the path itself", "P")
         if tolerance > 0:
             state.tolerance = tolerance * state.unit
         else:

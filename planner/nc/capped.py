@@ -143,15 +143,12 @@ def _divided(program: Program, block: Array, share: FloatArray) -> Program:
     normal = program.arc_normal[arc]
     centre[pick, normal] = (begin[block] + before[:, None] * (program.end - begin)[block])[on, normal]
     ends[last] = program.end[block[last]]
-    control, before_last = (
-        program.path_control[block],
-        ~last & (program.path_control[block] != PathControl.BLEND),
-    )
+    control = program.path_control[block]
     parts = divided(
         program,
         block,
         end=ends,
-        path_control=np.where(before_last, PathControl.EXACT_PATH, control),
+        path_control=np.where(last | (control == PathControl.BLEND), control, PathControl.EXACT_PATH),
         **({"extruded": program.extruded[block] * (share - before)} if len(program.extruded) else {}),
     )
     sweep = program.arc_sweep[arc] * (share - before)[on]

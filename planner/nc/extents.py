@@ -157,11 +157,8 @@ def travel_faults(
         faults.append(Fault(line, column, letter.upper(), f"{said}; --ignore-travel plans it"))
     if not known:
         mixed = any(NO_G54 in text for text in program.assumptions)
-        compared = (
-            "nothing is compared: the program mixes both coordinates"
-            if mixed
-            else "only lengths are compared"
-        )
+        both = "nothing is compared: the program mixes both coordinates"
+        compared = both if mixed else "only lengths are compared"
         notes.append(f"travel: the machine file has no G54 ([work_offsets.g54]), so {compared}")
         faults = [] if mixed else faults
     return sorted(faults, key=lambda fault: fault.line), notes

@@ -230,11 +230,8 @@ class IgnoredWords:
 
     def notes(self) -> list[Note]:
         """Everything that was assumed, by its first line."""
-        return [
-            Note(
-                of.line,
-                f"{what.named(of.times)}: {what.meaning}; first {of.word} line {of.line}",
-                what.changes,
-            )
-            for what, of in self._counted.items()
-        ]
+        notes = []
+        for what, of in self._counted.items():
+            text = f"{what.named(of.times)}: {what.meaning}; first {of.word} line {of.line}"
+            notes.append(Note(of.line, text, what.changes))
+        return notes

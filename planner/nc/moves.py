@@ -205,9 +205,8 @@ def _arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
     axial = block.value.get("IJK"[normal])  # many programs write K0 in G17
     remedy = ""
     if axial is not None and (axial != 0.0 or state.strict):
-        remedy = (
-            f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane before it"
-        )
+        remedy = f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane"
+        remedy += " before it"
     elif "R" in block.value and block.has("IJK"):
         remedy = "R and I J K on one line both define the centre; write one of them"
     elif "R" in block.value and not block.has("XYZ"[a] + "XYZ"[b]):

@@ -10,9 +10,7 @@ the G92 offset, G10 L20 for the system's origin, G10 L10 for the tool's. G52 giv
 takes coordinates as absolute, whatever G90 and G91 say. Fanuc's and Haas' G10 L20 P gives the origin of G54.1
 P; what would add after G91 is refused: the flat program (language/flat.py) could not say it.
 
-Axes beside x, y and z, rotary A B C in degrees and linear U V W in mm, are joints without rotation of the
-work system and tool offsets. F is the speed of x, y and z together if one of them moves, else of u, v and w,
-else of the rotary axes.
+Axes beside x, y and z are joints without rotation of the work system and tool offsets.
 """
 
 from dataclasses import replace
@@ -82,9 +80,8 @@ def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
 def take_system(state: State, block: Block, findings: Findings) -> None:
     """G54 to G59.3 and G54.1: the work system from here on. Raises WordFault for G54.1 without a valid P."""
     code = block.g["work offset"]
-    block.require(
-        code < _OF_HAAS or not state.strict, str(codes.unknown("G", code, strict=True)), "work offset"
-    )
+    unknown = str(codes.unknown("G", code, strict=True))
+    block.require(code < _OF_HAAS or not state.strict, unknown, "work offset")
     if code in (541, _G154):
         number = integer(block, "P", 1) if "P" in block.value else 0
         text = f"G{codes.number(code)} needs its work system as P1 to P{FURTHER_MAX}"

@@ -113,10 +113,8 @@ def read_points(data: bytes, source: str) -> Program:
     except (ValueError, KeyError, TypeError, RecursionError) as fault:
         raise InputError(f"{none}: {fault!r}", source=source) from None
     good = known and position.ndim == 2 and position.shape[1] == len(axes) and len(position) > 1
-    good = (
-        good and feed.shape == (len(position) - 1,) and bool(np.isfinite(position).all()) and (feed > 0).all()
-    )
-    good = good and min(begin, end) >= 0.0 and max(begin, end) < np.inf
+    good = good and feed.shape == (len(position) - 1,) and bool(np.isfinite(position).all())
+    good = good and (feed > 0).all() and min(begin, end) >= 0.0 and max(begin, end) < np.inf
     if not good or (tolerance is not None and not 0 < tolerance < np.inf):
         text = f"{none}: format points, axes xyz..., points (n+1, A), n feeds above 0 or null"
         raise InputError(text, source=source)

@@ -87,9 +87,8 @@ class ToolPoint:
     word: str  # what switched it on first: "G43.4", "M428", "M128"
     line: int  # where
     length: float  # of the tool, which z holds [mm]
-    rapids_off: int = (
-        0  # rapid moves while it was off and a rotary axis not at 0, as their paths of the tip, in chords
-    )
+    # rapid moves with it off and a rotary axis not at 0: chords of their paths of the tip
+    rapids_off: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -121,9 +121,8 @@ class SplineReader:
             return _even_knots(opened, block), opened.line
         if opened is None:
             if now != NURBS:
-                raise _fault(
-                    block, "control points of a spline after its G5.3; write G5.2, or another motion code"
-                )
+                what = "control points of a spline after its G5.3"
+                raise _fault(block, f"{what}; write G5.2, or another motion code")
             start = [state.position[:3].copy()]
             opened = self.open = OpenSpline(block.line, block.at["motion"], NURBS, 3, blocks, start, [1.0])
             if not block.has("XY"):
@@ -144,9 +143,8 @@ class SplineReader:
         opened = self.open
         if opened is None:
             if block.g.get("motion") != NURBS_WITH_KNOTS:
-                raise _fault(
-                    block, "words of a spline after its last knot; write G6.2, or another motion code"
-                )
+                what = "words of a spline after its last knot"
+                raise _fault(block, f"{what}; write G6.2, or another motion code")
             order = _order(block, "P") if "P" in block.value else 4
             opened = self.open = OpenSpline(block.line, block.at["motion"], NURBS_WITH_KNOTS, order, blocks)
         else:
@@ -191,10 +189,9 @@ def _split(pieces: FloatArray) -> Pieces:
 
 def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
     """(3,) where X and Y lead [mm]."""
-    block.require(state.normal == 2, f"{name} is a curve in the X Y plane; write G17 before it")
-    block.require(
-        "Z" not in block.value, f"{name} is a curve in the X Y plane; Z does not move along it", "Z"
-    )
+    curve = f"{name} is a curve in the X Y plane"
+    block.require(state.normal == 2, f"{curve}; write G17 before it")
+    block.require("Z" not in block.value, f"{curve}; Z does not move along it", "Z")
     block.require(block.has("XY"), f"{name} needs an end point; write X and Y")
     text = "control points of G5.2 with G91 are relative to what? write G90 before it"
     block.require(state.absolute or name != "G5.2", text, "XY")
@@ -261,10 +258,9 @@ def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
     block.require(good, f"first {order} knots of order {order} must be equal, and the last {order}", "K")
     inner = knots[order:-order]
     times = np.unique(inner, return_counts=True)[1].max(initial=0)
-    text = (
-        f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve"
-    )
-    block.require(times < order and inner.min(initial=np.inf) != knots[0], text, "K")
+    often = f"a knot inside a spline of order {order} may occur {order - 1} times at most"
+    good = times < order and inner.min(initial=np.inf) != knots[0]
+    block.require(good, f"{often}: more break the curve", "K")
     good = inner.max(initial=-np.inf) != knots[-1]
     block.require(good, f"the last {order} knots must be larger than those before: more break it", "K")
     return _curve(opened, knots)

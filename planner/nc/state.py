@@ -225,9 +225,7 @@ def state_of(machine: Machine | None, left_out: Container[str] = ()) -> State:
             unit=unit,
             feed_unit=unit,
             path_control=PathControl[machine.path_control.upper()],
-            systems={
-                system_code(name): System(_vector(at, letters)) for name, at in machine.work_offsets.items()
-            },
+            systems={system_code(n): System(_vector(at, letters)) for n, at in machine.work_offsets.items()},
             homes={_HOMES[name]: _vector(place, letters) for name, place in machine.positions.items()},
             tools={n: Tool(_vector(size, letters), diameter) for n, (size, diameter) in tools.items()},
             change_timed=machine.times is not None and machine.times.tool_change is not None,

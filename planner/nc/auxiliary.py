@@ -26,8 +26,7 @@ _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per
 SURFACE_STEP = 0.05  # change of the spindle's speed in a part of a move: as much as overrides are set to
 _LEAST_RADIUS = 1e-3  # below which the speed is that at it [mm]: no turned part is thinner
 _MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per minute
-# Below this feed [programmed units per minute] LinuxCNC takes this one under G93
-# (inverse_time_rate_straight).
+# Below this feed [programmed units/min] LinuxCNC takes this one under G93 (inverse_time_rate_straight).
 LINUXCNC_SLOWEST = 0.1
 _DWELL = 40  # G4, whose S is a time where it has no other
 # Ten times M codes: the one that reads an input, and the words that each needs.

@@ -45,8 +45,7 @@ PROGRAM_NUMBER = Assumption("program number{|s}", "kept, without effect")
 
 
 def command(words: Words, word: int, block: Block, ignored: IgnoredWords) -> bool:
-    """Execute a line to the control ($X, ?, {"xvm":1000}) or its operator into `block`; False for none, or one
-    that may move."""
+    """Execute a line to the control or its operator into `block`; False for none, or one that may move."""
     if block.g or block.m or block.value or ignored.strict:
         return False
     at = int(words.at[word])

@@ -65,8 +65,7 @@ _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [program
 
 @dataclass(frozen=True)
 class Hole:
-    """A hole in programmed coordinates and units, in which pecks add up as in the control: in the plane
-    (a, b), along its normal c."""
+    """A hole in programmed coordinates and units, in the plane (a, b) and along its normal c."""
 
     code: int  # tenths of the G code
     place: tuple[float, float]  # (a, b)

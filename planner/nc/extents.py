@@ -195,8 +195,7 @@ def _of_joints(program: Program, machine: Machine) -> tuple[FloatArray, FloatArr
 
 
 def _named_before(lines: list[bytes], line: int, letter: str) -> bool:
-    """Whether a program moves an axis, if only to where it is, before a line: its start is a place of the program
-    then, and not only assumed."""
+    """Whether a program names an axis before a line: its start is a place of it then, and not assumed."""
     word = re.compile(rb"(?<![A-Z#<])" + letter.encode() + rb"\s*[-+=\d.\[#]", re.IGNORECASE)
     words = (_COMMENT.sub(b"", text) for text in lines[: line - 1])
     return any(word.search(text) and not _SETS.search(text) for text in words)

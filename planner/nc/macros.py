@@ -131,8 +131,7 @@ def _rendered(body: str, params: dict[str, str]) -> str:
 
 
 def _value_of(text: str, scope: Mapping[str, Any], checked: Callable[[Any], Any] = lambda v: v) -> Any:
-    """The value of an expression: Python's grammar is Jinja's but for filters, which bind as ** does. Raises
-    _Unknown."""
+    """The value of an expression, in Python's grammar with ** for the | of filters. Raises _Unknown."""
     said = text.strip()[:40]
     try:
         if "**" not in text and len(text) < _TEXT_MAX:

@@ -71,10 +71,9 @@ class Block:
         return self.at.get("motion", first)
 
     def fault(self, message: str, at: str = "") -> WordFault:
-        """A fault of the word of a letter or modal group, of the first of some letters, else of the one that makes
-        the block move."""
-        known = self.motion_word if not at else lambda: self.at[at] if at in self.at else self.first_of(at)
-        return WordFault(known(), message)
+        """A fault of a letter's or group's word, the first of some letters, or the one that makes it move."""
+        word = self.motion_word() if not at else self.at[at] if at in self.at else self.first_of(at)
+        return WordFault(word, message)
 
     def require(self, good: bool, message: str, at: str = "") -> None:
         """Raise such a fault unless all is good."""
@@ -90,11 +89,12 @@ def unused(letter: str) -> str:
 
 
 class ArcFault(WordFault):
-    """The words of an arc contradict each other; `otherwise`: the other of G90.1 and G91.1 would close it."""
+    """The words of an arc contradict each other."""
 
-    def __init__(self, word: int, message: str, *, otherwise: bool):
-        super().__init__(word, message)
-        self.otherwise = otherwise
+    @property
+    def otherwise(self) -> bool:
+        """Whether the other of G90.1 and G91.1 would close it."""
+        return _CLOSES_IF in self.message
 
 
 def take_polar(state: State, block: Block) -> None:
@@ -178,7 +178,7 @@ def arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
     try:
         return _arc(state, block, end)
     except arcs.ArcError as fault:
-        raise ArcFault(block.motion_word(), str(fault), otherwise=_CLOSES_IF in str(fault)) from fault
+        raise ArcFault(block.motion_word(), str(fault)) from fault
 
 
 def _plane(state: State) -> tuple[int, bool]:

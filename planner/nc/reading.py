@@ -51,8 +51,7 @@ _SAY = (
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Settings of the reader, kept in `Program.reading`. Raises InputError for a value that is not one of
-    these."""
+    """Settings of the reader, kept in `Program.reading`. Raises InputError for values that are none."""
 
     strict: bool = False  # refuse everything that would be assumed
     # what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands and words ("$X",

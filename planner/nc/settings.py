@@ -18,8 +18,7 @@ from planner.nc.codes import G_GROUP, M_GROUP, M_REFUSED, Assumption
 AXES = "XYZABCUVW"
 _MOVED = frozenset(AXES + "IJK")
 EVERYTHING = "ABCDEFHIJKLNPQRSTUVWXYZ"
-# Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, and settings of grbl with
-# what they limit.
+# Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, settings of grbl with what they limit.
 SETS_LIMITS = frozenset((201, 202, 203, 204, 220))
 VELOCITY_LIMIT = "SET_VELOCITY_LIMIT"
 SET_RETRACTION = "SET_RETRACTION"

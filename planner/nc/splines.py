@@ -17,8 +17,7 @@ from planner.nc.moves import Block, WordFault, target
 from planner.nc.state import State
 
 ORDERS = (2, 3, 4)  # of G5.2 and G6.2: degree + 1, at most that of cubic pieces
-# A first control point this near is where the machine stands [mm]: the least digit of metric programs.
-SAME_PLACE = 1e-3
+SAME_PLACE = 1e-3  # a first control point this near is where the machine stands [mm]
 Pieces = tuple[FloatArray, FloatArray]  # (K, 4, 3) control points [mm] and (K, 4) weights
 _CODES = {NURBS: (NURBS, NURBS_END), NURBS_WITH_KNOTS: (NURBS_WITH_KNOTS,)}  # that do not leave a curve
 

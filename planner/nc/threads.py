@@ -20,6 +20,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc import codes, moves
@@ -155,8 +157,7 @@ def cut_thread(state: State, table: BlockTable, block: Block, findings: Findings
     feed = _feed(state, block, 1.0)
     for cut in passes(read):
         here[[0, 2]] = cut.end.imag * state.unit, cut.end.real * state.unit
-        place = state.position.copy()
-        place[:3] = state.machine(here)[:3]
+        place = np.append(state.machine(here)[:3], state.position[3:])
         if cut.pitch:
             _cut(state, table, block.line, place, cut.pitch * feed)
         else:

@@ -76,8 +76,7 @@ def pattern_repeat(contour: Contour, passes: int, shift: complex, allowance: com
 
 
 def stock_removal(contour: Contour, given: Roughing) -> Iterator[Leg]:
-    """The moves of G71, whose levels are imaginary parts; those of G72 with x and z exchanged. Raises
-    ValueError."""
+    """The moves of G71, with imaginary levels; of G72 with x and z exchanged. Raises ValueError."""
     count = max((k + 1 for k, leg in enumerate(contour.legs) if k and not leg.fast), default=0)
     if count < 2:
         raise ValueError("the profile has no move at its feed behind its first one")
@@ -133,8 +132,7 @@ class _Removal:
         yield Leg(end, fast=fast)
 
     def below(self, n: int, span: tuple[float, float]) -> Iterator[Leg]:
-        """The passes from the level n on that lie below a pass of the level before, a pocket to its ground
-        before the next one."""
+        """The passes from level n on below one of the level before, a pocket to its ground before the next."""
         level = self._level(n)
         if self.out * level - self.lowest <= SAME:
             return
@@ -191,8 +189,7 @@ class _Removal:
 
 
 def _monotone(legs: list[Leg]) -> Iterator[tuple[complex, Leg]]:
-    """The legs behind the first one and where they start, arcs in parts along which neither z nor x turns
-    back."""
+    """The legs behind the first and their starts, arcs in parts along which no axis turns back."""
     at = legs[0].end
     for leg in legs[1:]:
         for end in (*_quadrants(at, leg), leg.end):

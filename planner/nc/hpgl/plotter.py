@@ -21,7 +21,7 @@ from planner.nc.arcs import Arc
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Fault, Notes
 from planner.nc.hpgl import instructions as written
-from planner.nc.hpgl.drawing import Point, Scaling, ScalingError, circle_through
+from planner.nc.hpgl.drawing import NotDrawn, Point, Scaling, circle_through
 from planner.nc.hpgl.instructions import FORMS, IGNORED, Instruction
 from planner.nc.program import Kind, Program
 from planner.nc.reading import AS_USUAL, Reading
@@ -37,10 +37,6 @@ WORD_SHOWN = 20  # characters of an instruction in a message
 SWEEP_MIN = 1e-6
 
 
-class _NotDrawn(Exception):
-    """The instruction cannot be executed; the text says why."""
-
-
 def read_drawing(
     data: bytes, machine: Machine | None, source: str, reading: Reading = AS_USUAL
 ) -> tuple[Program, Sequence[Fault]]:
@@ -49,8 +45,11 @@ def read_drawing(
     run = _Run(data, machine, reading)
     found = 0
     for instruction in written.instructions(data, run.report, run.note):
-        run.execute(instruction)
         found += 1
+        try:
+            run.execute(instruction)
+        except NotDrawn as fault:
+            run.report(instruction.at, instruction.end, str(fault))
     if not found and not run.reports:
         text = "the plotter file is empty: there is no instruction in it"
         raise InputError(text, source=source, line=1, column=1)
@@ -124,12 +123,6 @@ class _Run:
         return line + 1, at - (self._line_ends[line - 1] if line else -1)
 
     def execute(self, it: Instruction) -> None:
-        try:
-            self._execute(it)
-        except (_NotDrawn, ScalingError) as fault:
-            self.report(it.at, it.end, str(fault))
-
-    def _execute(self, it: Instruction) -> None:
         name, numbers = it.name, it.numbers
         form = FORMS.get(name)
         no_symbol = name == "SM" and not it.text.strip(b"; \r\n")
@@ -139,13 +132,13 @@ class _Run:
         elif form is None and (name in IGNORED or no_symbol):
             changes = name in written.CHANGING or (name in written.WITH_NUMBERS and numbers)
             if changes and self.strict:
-                raise _NotDrawn(f"{IGNORED[name]} (assumed without --strict)")
+                raise NotDrawn(f"{IGNORED[name]} (assumed without --strict)")
             (self.changing if changes else self.ignored).setdefault(name, []).append(it.at)
         elif form is None:
             allowed = f"there is no such instruction; allowed are {written.ALLOWED}"
-            raise _NotDrawn(written.REFUSED.get(name, allowed))
+            raise NotDrawn(written.REFUSED.get(name, allowed))
         elif not form.fits(len(numbers)):
-            raise _NotDrawn(f"{len(numbers)} numbers found; write {form}")
+            raise NotDrawn(f"{len(numbers)} numbers found; write {form}")
         else:
             _EXECUTE[name](self, it)
 
@@ -174,11 +167,11 @@ class _Run:
         centre = self._point(*it.numbers[:2], absolute=it.name == "AA")
         degrees = it.numbers[2]
         if not 0 < abs(degrees) <= FULL_TURN:
-            raise _NotDrawn(f"a sweep of {degrees:g} degrees; allowed are -360 to 360, but not 0")
+            raise NotDrawn(f"a sweep of {degrees:g} degrees; allowed are -360 to 360, but not 0")
         sweep = degrees * RAD_PER_DEG * self.scaling.handedness()
         dx, dy = self.position[0] - centre[0], self.position[1] - centre[1]
         if not math.hypot(dx, dy) > 0:
-            raise _NotDrawn("the arc has no radius: the pen stands on its centre")
+            raise NotDrawn("the arc has no radius: the pen stands on its centre")
         end = self.position
         if abs(degrees) < FULL_TURN:
             cos, sin = math.cos(sweep), math.sin(sweep)
@@ -199,7 +192,7 @@ class _Run:
     def _circle(self, it: Instruction) -> None:
         radius, at = it.numbers[0], it.at
         if radius == 0:
-            raise _NotDrawn("a circle of radius 0; write its radius, such as CI400")
+            raise NotDrawn("a circle of radius 0; write its radius, such as CI400")
         handedness = self.scaling.handedness()
         centre, was_down = self.position, self.down
         start = self._point(radius, 0.0, absolute=False)
@@ -222,7 +215,7 @@ class _Run:
     def _select_pen(self, it: Instruction) -> None:
         pen = it.numbers[0] if it.numbers else 0.0
         if pen != round(pen) or pen < 0:
-            raise _NotDrawn("a pen is a whole number, 0 (put the pen away) or more")
+            raise NotDrawn("a pen is a whole number, 0 (put the pen away) or more")
         if pen == self.pen:
             return
         was_down = self.down
@@ -237,7 +230,7 @@ class _Run:
         numbers = it.numbers
         speed = numbers[0] * MM_PER_CM if numbers else math.inf
         if not speed > 0:
-            raise _NotDrawn("a speed must be positive; write the pen's speed in cm/s, such as VS20")
+            raise NotDrawn("a speed must be positive; write the pen's speed in cm/s, such as VS20")
         if len(numbers) == 2:
             self.speed_of_pen[round(numbers[1])] = speed
         else:

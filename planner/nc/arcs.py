@@ -23,13 +23,12 @@ from planner.base.units import MM_PER_INCH
 
 AXES = "xyz"
 IN_PLANE = {2: (0, 1), 1: (2, 0), 0: (1, 2)}  # the plane's axes by its normal, right-handed
-# By programmed unit [mm]; LinuxCNC's own numbers, sqrt(2) * 0.02 mm and sqrt(2) * 0.002 inch, found again by
-# bisection on it.
+# By programmed unit [mm]; LinuxCNC's own numbers, found again by bisection on it.
 CLOSURE = {1.0: 0.02 * math.sqrt(2.0), MM_PER_INCH: 0.002 * math.sqrt(2.0) * MM_PER_INCH}
 RADIUS_MIN = {1.0: 0.00127, MM_PER_INCH: 0.00005 * MM_PER_INCH}
 CLOSURE_RELATIVE = 1e-3
 HALF_CIRCLE = 1e-12  # relative
-# Two points are one [mm]: a tenth of the finest digit of programs, far above the rounding of sums.
+# two points are one [mm]: far below the finest digit of programs, far above the rounding of sums
 SAME_PLACE = 1e-7
 # Below this angle [rad] some controls make a full turn of an arc (grbl 5e-7, previews 1e-6); twice the
 # rounding of a turn written out.
@@ -75,10 +74,9 @@ def arc_from_radius(start: FloatArray, end: FloatArray, radius: float, way: ArcW
     if half == 0.0:
         raise ArcError("an arc with R must not end where it starts; write a full circle with I J K")
     if half - size > RADIUS_MIN[unit] or size == 0.0:
-        raise ArcError(
-            f"radius {size:.6g} mm does not reach the end point, which is {2 * half:.6g} mm away; at least "
-            f"{half:.6g} mm is needed (rounding of {RADIUS_MIN[unit]:.3g} mm allowed)"
-        )
+        away = f"radius {size:.6g} mm does not reach the end point, which is {2 * half:.6g} mm away"
+        least = f"at least {half:.6g} mm is needed (rounding of {RADIUS_MIN[unit]:.3g} mm allowed)"
+        raise ArcError(f"{away}; {least}")
     height = math.sqrt((size - half) * (size + half)) if half < size * (1.0 - HALF_CIRCLE) else 0.0
     # left of the chord for a counter-clockwise arc of less than half a turn
     left = height if clockwise == (radius < 0) else -height
@@ -95,16 +93,14 @@ def not_closed(start: FloatArray, end: FloatArray, centre: FloatArray, normal: i
     a, b = IN_PLANE[normal]
     r0 = math.hypot(start[a] - centre[a], start[b] - centre[b])
     r1 = math.hypot(end[a] - centre[a], end[b] - centre[b])
+    radii = f"the arc has radius {r0:.6g} mm at its start and {r1:.6g} mm at its end"
     if r0 < RADIUS_MIN[unit] or r1 < RADIUS_MIN[unit]:
-        return f"the arc has radius {r0:.6g} mm at its start and {r1:.6g} mm at its end; at least {RADIUS_MIN[unit]:.3g} mm"
+        return f"{radii}; at least {RADIUS_MIN[unit]:.3g} mm"
     gap, closure = abs(r0 - r1), CLOSURE[unit]
     allowed = min(100.0 * closure, max(closure, CLOSURE_RELATIVE * max(r0, r1)))
-    if gap <= allowed:
-        return ""
-    return (
-        f"the arc has radius {r0:.6g} mm at its start and {r1:.6g} mm at its end: {gap:.6g} mm apart, allowed are "
-        f"{allowed:.6g} mm (centre at {AXES[a]} {centre[a]:.6g}, {AXES[b]} {centre[b]:.6g})"
-    )
+    centred = f"(centre at {AXES[a]} {centre[a]:.6g}, {AXES[b]} {centre[b]:.6g})"
+    apart = f"{radii}: {gap:.6g} mm apart, allowed are {allowed:.6g} mm {centred}"
+    return apart if gap > allowed else ""
 
 
 def _sweep(start: FloatArray, end: FloatArray, centre: FloatArray, way: ArcWay) -> float:

@@ -26,19 +26,14 @@ _MODES: dict[int, FeedMode] = {930: "inverse time", 940: "per minute", 950: "per
 SURFACE_STEP = 0.05  # change of the spindle's speed in a part of a move: as much as overrides are set to
 _LEAST_RADIUS = 1e-3  # below which the speed is that at it [mm]: no turned part is thinner
 _MM_PER_METRE, _MM_PER_FOOT = 1000.0, 304.8  # S of G96 is in metres or feet per minute
-# Below this feed [programmed units per minute] LinuxCNC takes this one under G93
-# (inverse_time_rate_straight).
+# Below this feed [programmed units/min] LinuxCNC takes this one under G93 (inverse_time_rate_straight).
 LINUXCNC_SLOWEST = 0.1
-# Ten times M codes: the one that reads an input, and the words that each needs.
 _DWELL = 40  # G4, whose S is a time where it has no other
+# Ten times M codes: the one that reads an input, and the words that each needs.
 _READ_INPUT = 660
 _NEEDED = {620: "P", 630: "P", 640: "P", 650: "P", _READ_INPUT: "", 670: "EQ", 680: "EQ"}
-# By ten times the G code.
-_EXACT_PATH = 610
+_EXACT_PATH = 610  # by ten times the G code, as the others
 _PATH_CONTROLS = {_EXACT_PATH: PathControl.EXACT_PATH, 611: PathControl.EXACT_STOP, 640: PathControl.BLEND}
-# Blocks that one line can give beyond one per line: stops beside threads, G28 through an intermediate point,
-# a dwell, M6, M0. Cycles make room for themselves.
-ROWS_AT_ONCE = 4
 _LONG = 60.0  # a dwell of a minute is no usual one [s]
 TURNING = {30: 1, 40: -1, 50: 0}  # of the spindle, by ten times M3, M4 and M5
 
@@ -51,9 +46,8 @@ def set_feed(state: State, block: Block, findings: Findings, column: Callable[[i
     if "F" not in block.value:
         return
     feed = block.value["F"]
-    if feed < 0 or (mode == "inverse time" and not feed):
-        text = "a feed must be positive; write the feed of the moves that follow, such as F1000"
-        raise block.fault(text, "F")
+    text = "a feed must be positive; write the feed of the moves that follow, such as F1000"
+    block.require(feed >= 0 and not (mode == "inverse time" and not feed), text, "F")
     if mode == "inverse time":
         return
     state.feed_zero = "" if feed else f" (F0 in line {block.line}, column {column(block.at['F'])}, is none)"
@@ -66,9 +60,8 @@ def set_feed(state: State, block: Block, findings: Findings, column: Callable[[i
     code = block.g.get("units")
     if code is not None and (code == 200) != (state.unit != 1.0):
         unit, per = "mm" if state.unit == 1.0 else "inch", mode.removeprefix("per ")
-        findings.note(
-            f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line", block.line
-        )
+        text = f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line"
+        findings.note(text, block.line)
 
 
 def take_default(
@@ -86,25 +79,21 @@ def take_default(
 
 def check_feed(state: State, block: Block) -> None:
     """See that the block has a feed, in `state.feed` under G94 and G95. Raises WordFault if it has none."""
-    word = block.motion_word()
     name = f"G{codes.number(10 * state.motion if state.motion <= 3 else state.motion)}"
     if state.feed_mode == "inverse time":
-        if state.motion > 3:
-            raise WordFault(word, f"{name} under G93 (inverse time) has no feed; write G94 before it")
-        if "F" not in block.value:
-            text = f"{name} under G93 (inverse time) needs an F word on its line: one over its minutes"
-            raise WordFault(word, text)
+        text = f"{name} under G93 (inverse time) has no feed; write G94 before it"
+        block.require(state.motion <= 3, text)
+        text = f"{name} under G93 (inverse time) needs an F word on its line: one over its minutes"
+        block.require("F" in block.value, text)
         return
     if state.feed_mode == "per turn" and state.feed_per_turn > 0:
-        if not state.spindle.speed > 0:
-            text = f"{name} with a feed per turn (G95) needs a spindle speed; write an S word before it"
-            raise WordFault(word, text)
+        text = f"{name} with a feed per turn (G95) needs a spindle speed; write an S word before it"
+        block.require(state.spindle.speed > 0, text)
         if state.spindle.surface_speed:
             return  # its feed depends on the diameter: `surface_feed`
         state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE
-    if not state.feed > 0:
-        remedy = "write an F word on this line or before it, or feed_default into the machine file"
-        raise WordFault(word, f"{name} moves without a feed{state.feed_zero}; {remedy}")
+    remedy = "write an F word on this line or before it, or feed_default into the machine file"
+    block.require(state.feed > 0, f"{name} moves without a feed{state.feed_zero}; {remedy}")
 
 
 def on_surface(state: State) -> bool:
@@ -158,8 +147,8 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
     """Keep S, T and the codes that a control passes on, and what they set. Raises WordFault."""
     line = block.line
     if "S" in block.value and (block.g.get("one-shot") != _DWELL or block.has("PXU")):
-        if block.value["S"] < 0:
-            raise block.fault("a spindle speed must not be negative; write M4 to turn the other way", "S")
+        text = "a spindle speed must not be negative; write M4 to turn the other way"
+        block.require(block.value["S"] >= 0, text, "S")
         table.add_event("S", block.value["S"], line)
         state.spindle.speed = block.value["S"]
     if "T" in block.value:
@@ -167,15 +156,13 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
         table.add_event("T", state.tool_selected, line)
     if "signals" in block.m:
         code = block.m["signals"]
-        if not block.value.keys() >= set(_NEEDED[code]):
-            raise block.fault(f"M{code // 10} needs the words {' and '.join(_NEEDED[code])}", "signals")
-        if code == _READ_INPUT and block.value.get("L", 0.0) != 0.0:
-            text = "M66 waits for an input of the control, which only the machine knows"
-            raise block.fault(f"{text}; plan the parts before and after it", "signals")
+        text = f"M{code // 10} needs the words {' and '.join(_NEEDED[code])}"
+        block.require(block.value.keys() >= set(_NEEDED[code]), text, "signals")
+        text = "M66 waits for an input of the control, which only the machine knows; plan the parts before and after it"
+        block.require(code != _READ_INPUT or block.value.get("L", 0.0) == 0.0, text, "signals")
         table.add_event("M", code / 10, line)
     if "tool number" in block.m:
-        if "Q" not in block.value:
-            raise block.fault("M61 needs the tool's number as a Q word", "tool number")
+        block.require("Q" in block.value, "M61 needs the tool's number as a Q word", "tool number")
         state.tool_loaded = integer(block, "Q", 0)
     if "tool change" in block.m:
         state.tool_loaded = state.tool_selected
@@ -187,7 +174,6 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
         else:
             why = "its time is not included, [times] tool_change of the machine file gives it"
             findings.assume(f"{text}; {why}", line, block.at["tool change"])
-    table.make_room(len(block.events) + 3 * ROWS_AT_ONCE)  # a line may hold any number of them
     for letter, value in block.events:
         table.add_event(letter, value, line)
     for group in ("spindle", "spindle orientation", "coolant", "override"):
@@ -195,9 +181,9 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
             table.add_event("M", block.m[group] / 10, line)
     state.spindle.turning = TURNING.get(block.m.get("spindle", -1), state.spindle.turning)
     if "spindle mode" in block.g:
-        state.spindle.surface_speed = block.g["spindle mode"] == 960
-        if state.spindle.surface_speed and "S" not in block.value:
-            raise block.fault("G96 needs the surface speed as an S word", "spindle mode")
+        surface = state.spindle.surface_speed = block.g["spindle mode"] == 960
+        text = "G96 needs the surface speed as an S word"
+        block.require(not surface or "S" in block.value, text, "spindle mode")
         state.spindle.speed_max = abs(block.value.get("D", 0.0))
     for code in block.g.values():
         if code in codes.G_EVENTS:
@@ -217,9 +203,9 @@ def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, 
     elif seconds is None and not ignored.strict and (ignored.printer or "S" in block.value):
         seconds = block.value.get("S", 0.0)
         findings.note("G4 S is in seconds, G4 alone a full stop, as 3-D printers have it", block.line)
+    text = "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5"
     if seconds is None or seconds < 0:
-        word = block.at["one-shot"] if seconds is None else block.at["P"]
-        raise WordFault(word, "a dwell needs its seconds as a P word that is not negative, such as G4 P0.5")
+        raise block.fault(text, "one-shot" if seconds is None else "P")
     assume_seconds(state, block, seconds if "P" in block.value and not ignored.printer else 0.0, findings)
     table.add_dwell(seconds, block.line, state)
 
@@ -242,20 +228,18 @@ def assume_rapids(table: BlockTable, ignored: IgnoredWords, findings: Findings) 
 def path_control(state: State, block: Block, ignored: IgnoredWords, findings: Findings) -> None:
     """G61, G61.1 and G64 with its tolerance. Raises WordFault, for Marlin's G61 too."""
     word, code = block.at["path control"], block.g["path control"]
-    if code == _EXACT_PATH and ignored.printer:
-        text = "G61 of 3-D printers goes back to a position that the control has saved; write G1 to it"
-        raise WordFault(word, text)
+    text = "G61 of 3-D printers goes back to a position that the control has saved; write G1 to it"
+    block.require(code != _EXACT_PATH or not ignored.printer, text, "path control")
     if code == _EXACT_PATH and "S" in block.value and not block.m and "motion" not in block.g:
         text = "G61 with S is exact path and the spindle's speed; in Marlin it goes back to a saved position"
         findings.assume(text, block.line, word)
     state.path_control, state.tolerance = _PATH_CONTROLS[code], np.nan
     if "P" in block.value and code == 640:
         tolerance = block.value["P"]
-        if tolerance < 0:
-            raise block.fault("a tolerance must not be negative; write G64 P0.05", "P")
-        if tolerance > 0 and tolerance * state.unit < TOLERANCE_MIN:
-            text = f"a tolerance must not be below {TOLERANCE_MIN:g} mm; write G64 P0.05, or G61 for the path itself"
-            raise block.fault(text, "P")
+        block.require(tolerance >= 0, "a tolerance must not be negative; write G64 P0.05", "P")
+        least = f"a tolerance must not be below {TOLERANCE_MIN:g} mm"
+        enough = tolerance == 0 or tolerance * state.unit >= TOLERANCE_MIN
+        block.require(enough, f"{least}; write G64 P0.05, or G61 for the path itself", "P")
         if tolerance > 0:
             state.tolerance = tolerance * state.unit
         else:

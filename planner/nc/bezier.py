@@ -16,8 +16,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 
 DEGREE_MAX = 3  # of the pieces: higher degrees are refused (splines.py)
-# Nodes on every step, and steps of a piece, for its length: good to 1e-9 of the length of the butterfly of
-# paper 001 (tested).
+# Nodes on every step, and steps of a piece, for its length: good to 1e-9 of that of the butterfly of paper 001.
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(16)
 LENGTH_STEPS = 8
 
@@ -35,10 +34,8 @@ def cubic_pieces(control: FloatArray, knots: FloatArray, degree: int) -> FloatAr
     degree  : 1, 2 or 3
     """
     cuts = np.unique(knots[degree : len(control) + 1])
-    pieces = [
-        [_blossom(control, knots, degree, a, b, i) for i in range(degree + 1)] for a, b in pairwise(cuts)
-    ]
-    return raised(np.array(pieces))
+    steps, order = list(pairwise(cuts)), range(degree + 1)
+    return raised(np.array([[_blossom(control, knots, degree, a, b, i) for i in order] for a, b in steps]))
 
 
 def _blossom(control: FloatArray, knots: FloatArray, degree: int, a: float, b: float, i: int) -> FloatArray:
@@ -74,13 +71,8 @@ def halves(pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def evenly_weighted(pieces: FloatArray) -> FloatArray:
-    """The same curves with 1 for the outer two weights: another parameter, u / (u + (1-u) c), and a common
-    factor.
-
-    pieces : (K, 4, A+1)
-
-    Returns (K, 4, A+1).
-    """
+    """The same curves (K, 4, A+1) as `pieces` (K, 4, A+1), with 1 for the outer two weights: another parameter,
+    u / (u + (1-u) c), and a common factor."""
     first, last = pieces[:, 0, -1], pieces[:, 3, -1]
     factor = np.cbrt(first / last)[:, None] ** np.arange(4) / first[:, None]
     return np.asarray(pieces * factor[..., None])

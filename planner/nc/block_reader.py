@@ -45,8 +45,7 @@ PROGRAM_NUMBER = Assumption("program number{|s}", "kept, without effect")
 
 
 def command(words: Words, word: int, block: Block, ignored: IgnoredWords) -> bool:
-    """Execute a line to the control ($X, ?, {"xvm":1000}) or its operator into `block`; False for none, or one
-    that may move."""
+    """Execute a line to the control or its operator into `block`; False for none, or one that may move."""
     if block.g or block.m or block.value or ignored.strict:
         return False
     at = int(words.at[word])
@@ -96,8 +95,8 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
         code, value = int(words.letter[word]), float(words.value[word])
         if owned == MESSAGE or (owned == settings.EVERYTHING and code == FAULT):
             if block.settings:
-                start, end = int(words.at[word]), words.line_at(int(words.at[word]))[1]
-                text = words.data[start:end].partition(b";")[0].decode("latin-1").lower()
+                at = int(words.at[word])
+                text = words.data[at : words.line_at(at)[1]].partition(b";")[0].decode("latin-1").lower()
                 given = {letter: float(number or "nan") for letter, number in _BARE_WORD.findall(text)}
                 block.settings[-1].values.update(given)  # NaN where a letter has no number
             break
@@ -119,12 +118,16 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
                 ignored.count(PROGRAM_NAME, f"%{name[:NAME_SHOWN]}", block.line)
             block.ended = True
         elif letter == "O" and word > first + (words.letter[first] == ord("N")):
-            text = "the letter O inside a line; write the digit 0, or an O word at the start of its line"
-            report(word, text)
+            what = "the letter O inside a line"
+            report(word, f"{what}; write the digit 0, or an O word at the start of its line")
             return None
         elif letter == "O":
-            if not _program_number(words, word, last, block, report, ignored):
+            statement = value < 0 or (words.letter[word:last] == FAULT).any()
+            if statement or ignored.strict or value > NUMBER_MAX:
+                report(word, str(codes.LETTERS_REFUSED["O"]))
                 return None
+            ignored.count(PROGRAM_NUMBER, words.text(word), block.line)
+            block.events.append(("O", value))
         elif letter == "N" and "N" not in owned:
             if word > first:
                 report(word, "a line number comes first on its line, once")
@@ -153,20 +156,6 @@ def read_block(words: Words, row: int, report: Report, ignored: IgnoredWords) ->
     if not block.partial:
         _check_used(words, block, report, ignored)
     return block
-
-
-def _program_number(
-    words: Words, word: int, last: int, block: Block, report: Report, ignored: IgnoredWords
-) -> bool:
-    """Keep the number of a program as an event; False, after a report, for another O word."""
-    number = float(words.value[word])
-    statement = number < 0 or (words.letter[word:last] == FAULT).any()
-    if statement or ignored.strict or number > NUMBER_MAX:
-        report(word, str(codes.LETTERS_REFUSED["O"]))
-        return False
-    ignored.count(PROGRAM_NUMBER, words.text(word), block.line)
-    block.events.append(("O", number))
-    return True
 
 
 def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored: IgnoredWords) -> str | None:
@@ -223,11 +212,8 @@ def _add_code(
     if groups.get(group) == code and not ignored.strict:  # said twice
         return False
     if group in groups:
-        report(
-            word,
-            f"{letter}{codes.number(groups[group])} and {letter}{codes.number(code)} on one line are of the same "
-            f"group ({group}); write one of them, or two lines",
-        )
+        both = f"{letter}{codes.number(groups[group])} and {letter}{codes.number(code)}"
+        report(word, f"{both} on one line are of the same group ({group}); write one of them, or two lines")
         return True
     groups[group] = code
     block.at[group] = word
@@ -239,12 +225,8 @@ def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWord
     motion code, the one in force may use them: the interpreter looks."""
     named = [("G", code) for code in block.g.values()] + [("M", code) for code in block.m.values()]
     block.uses = frozenset("".join(codes.WORDS.get(name, "") for name in named))
-    if (
-        "P" in block.value
-        and "P" not in block.uses
-        and "spindle" in block.m
-        and not (ignored.strict or block.has("XYZ"))
-    ):
+    idle = "P" in block.value and "P" not in block.uses and "spindle" in block.m
+    if idle and not (ignored.strict or block.has("XYZ")):
         ignored.count(settings.SPINDLE_WORD, words.text(block.at["P"]), block.line)
         del block.value["P"]
     in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS

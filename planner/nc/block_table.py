@@ -74,6 +74,7 @@ class BlockTable:
 
     def add(self, kind: Kind, line: int, state: State) -> None:
         """Append a block that ends where the tool is."""
+        self.make_room(1)
         block, k = self.block, self.blocks
         block.kind[k] = kind
         block.end[k] = state.place
@@ -106,6 +107,7 @@ class BlockTable:
 
     def add_event(self, letter: str, value: float, line: int) -> None:
         """Append an event before the next block."""
+        self.make_room(1)
         event, k = self.event, self.events
         event.block[k] = self.blocks
         event.line[k] = line
@@ -142,9 +144,12 @@ class BlockTable:
         end[:, [letters[k] in DEGREES for k in columns]] *= RAD_PER_DEG
         others = len(columns) - 3
         centres = np.array([arc[1][:3] for arc in self.arcs]).reshape(-1, 3)
-        of_spline = np.array([spline[0] for spline in self.splines], dtype=np.int64)
-        points = np.array([spline[1] for spline in self.splines]).reshape(-1, 4, 3)
+        of_spline = np.array([block for block, _, _ in self.splines], dtype=np.int64)
+        points = np.array([points for _, points, _ in self.splines]).reshape(-1, 4, 3)
         still = np.repeat(end[of_spline, None, 3:], 4, axis=1)  # the other axes stand along a spline
+        points = np.concatenate([points, still], axis=2)
+        weights = np.array([weights for _, _, weights in self.splines]).reshape(-1, 4)
+        of_origin, offset, turned = ([origin[k] for origin in self.origins] for k in range(3))
         return Program(
             source=source,
             axes=tuple(letters[k].lower() for k in columns),
@@ -157,16 +162,10 @@ class BlockTable:
             arc_center=np.pad(centres, ((0, 0), (0, others))),
             arc_normal=np.array([arc[2] for arc in self.arcs], dtype=np.int64),
             arc_sweep=np.array([arc[3] for arc in self.arcs]),
-            splines=SplineTable(
-                block=of_spline,
-                points=np.concatenate([points, still], axis=2),
-                weights=np.array([spline[2] for spline in self.splines]).reshape(-1, 4),
-            ),
+            splines=SplineTable(block=of_spline, points=points, weights=weights),
             events=EventTable(**{name: column[seen].copy() for name, column in self.event._asdict().items()}),
             origins=Origins(
-                block=np.array([origin[0] for origin in self.origins]),
-                offset=np.array([origin[1] for origin in self.origins]).reshape(-1, 3),
-                turned=np.array([origin[2] for origin in self.origins]),
+                block=np.array(of_origin), offset=np.array(offset).reshape(-1, 3), turned=np.array(turned)
             ),
             notes=notes.assumptions + notes.others,
             assumptions=notes.assumptions,

@@ -2,16 +2,14 @@
 part of is divided there.
 
 Lengths count along x, y and z, from the start of the program, rapid moves included. A point divides a line by
-its length and an arc by its angle, both stay on the same curve. Splines and blocks on which rotary axes move are
-not divided: the lowest cap on them holds for all of the block. Rapid moves have no F, and threads none but that
-of the spindle.
+its length and an arc by its angle. Splines and blocks on which rotary axes move are not divided: the lowest cap on
+them holds for all of the block. Rapid moves have no F, and threads none but that of the spindle.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +20,7 @@ from planner.machine import LINEAR_AXES, ROTARY_AXES
 from planner.nc.extents import block_lengths, plane_axes, starts
 from planner.nc.feed_caps import FEED, FILE, FROM, LINE, TO, FeedCaps
 from planner.nc.points import in_inches
-from planner.nc.program import FEED_MOVES, EventTable, Kind, PathControl, Program, renumbered
+from planner.nc.program import FEED_MOVES, Kind, PathControl, Program, divided
 
 SHORT = 1e-3  # no part of a block is shorter [mm]: a cap that ends within a micrometre of its end ends there
 
@@ -43,7 +41,11 @@ def capped(program: Program, caps: FeedCaps | None, text: bytes = b"") -> Progra
         cap, block, share = _of_lengths(program, caps, cuts)
     else:
         cap, block, share = _of_lines(program, caps, text), np.arange(len(program)), np.ones(len(program))
-    feed = np.where(cuts[block], _in_feed(program, cap, unit, block), np.inf)
+    turns = np.array([axis in ROTARY_AXES for axis in program.axes])
+    moved = program.end != starts(program)
+    alone = moved[:, turns].any(axis=1) & ~moved[:, ~turns].any(axis=1) & (program.kind == Kind.LINE)
+    feed = cap * np.where(alone[block], RAD_PER_DEG / SECONDS_PER_MINUTE, unit)  # as `Program.feed` has them
+    feed = np.where(cuts[block], feed, np.inf)
     lower = feed < program.feed[block]
     if (bad := np.flatnonzero(lower & np.isin(block, program.synchronised))).size:
         what = f"{caps.source} lowers F on a thread; the spindle sets its feed, and nothing else can"
@@ -54,18 +56,9 @@ def capped(program: Program, caps: FeedCaps | None, text: bytes = b"") -> Progra
     parts = _divided(program, block[~joined], share[~joined])
     held, lowest = len(np.unique(block[lower])), float(feed[lower].min(initial=np.inf)) / unit
     down = f", down to F{lowest:.6g}" if held else ""
-    note = f"feed caps of {caps.source} hold on {held:,} blocks{down}"
-    return dataclasses.replace(
-        parts, feed=feed[~joined], uncapped=program.feed[block[~joined]], notes=(*program.notes, note)
-    )
-
-
-def _in_feed(program: Program, cap: FloatArray, unit: float, block: Array) -> FloatArray:
-    """Caps as `Program.feed` has them [mm/s], of blocks that only turn [rad/s]."""
-    turns = np.array([axis in ROTARY_AXES for axis in program.axes])
-    moved = program.end != starts(program)
-    alone = moved[:, turns].any(axis=1) & ~moved[:, ~turns].any(axis=1) & (program.kind == Kind.LINE)
-    return cap * np.where(alone[block], RAD_PER_DEG / SECONDS_PER_MINUTE, unit)
+    notes = (*program.notes, f"feed caps of {caps.source} hold on {held:,} blocks{down}")
+    uncapped = program.feed[block[~joined]]
+    return dataclasses.replace(parts, feed=feed[~joined], uncapped=uncapped, notes=notes)
 
 
 def _of_lines(program: Program, caps: FeedCaps, text: bytes) -> FloatArray:
@@ -74,14 +67,12 @@ def _of_lines(program: Program, caps: FeedCaps, text: bytes) -> FloatArray:
     main = Path(program.source).name
     frames = np.array([Path(frame.source).name for frame in program.frames] or [main])
     of_block = frames[program.frame] if len(program.frame) else np.full(len(program), main)
-    asked = np.array(
-        [main if name == caps.main else Path(name).name for name in caps.files] or [main] * len(line)
-    )
+    names = (main if name == caps.main else Path(name).name for name in caps.files or [caps.main] * len(line))
+    asked = np.array(list(names))
     known, last = {main, *frames.tolist()}, text.count(b"\n") + (not text.endswith(b"\n"))
     for k in np.flatnonzero(~np.isin(asked, list(known)))[:1].tolist():
-        raise caps.fault(
-            k, f"'{caps.files[k]}' is no file of the program; it has {', '.join(sorted(known))}", FILE
-        )
+        what = f"'{caps.files[k]}' is no file of the program; it has {', '.join(sorted(known))}"
+        raise caps.fault(k, what, FILE)
     for k in np.flatnonzero((asked == main) & (line > last))[:1].tolist():
         raise caps.fault(k, f"line {line[k]} of {main}; it has lines 1 to {last}", LINE)
     found = np.full(len(program), np.inf)
@@ -103,9 +94,7 @@ def _of_lengths(program: Program, caps: FeedCaps, cuts: Array) -> tuple[FloatArr
     # between two neighbouring `at` one cap holds: the lowest of the rows over them
     at = np.unique(np.concatenate([[0.0], begin, end, along[-1:]]))
     held = np.full(len(at), np.inf)
-    for a, b, cap in zip(
-        np.searchsorted(at, begin).tolist(), np.searchsorted(at, end).tolist(), feed, strict=True
-    ):
+    for a, b, cap in zip(np.searchsorted(at, begin), np.searchsorted(at, end), feed, strict=True):
         held[a:b] = np.minimum(held[a:b], cap)
     turns = [k for k, axis in enumerate(program.axes) if axis in ROTARY_AXES]
     turned = (program.end != starts(program))[:, turns].any(axis=1)
@@ -126,10 +115,8 @@ def _of_lengths(program: Program, caps: FeedCaps, cuts: Array) -> tuple[FloatArr
 
 def _divided(program: Program, block: Array, share: FloatArray) -> Program:
     """The program with its blocks in parts: the block (n,) of each, and where it ends (n,), as a share of it."""
-    count = np.bincount(block, minlength=len(program))
-    if (count == 1).all():
+    if len(block) == len(program):
         return program
-    first = np.append(0, np.cumsum(count))
     begin, last = starts(program), share == 1.0
     ends = begin[block] + share[:, None] * (program.end - begin)[block]
     before = np.where(np.append(True, block[1:] != block[:-1]), 0.0, np.append(0.0, share[:-1]))
@@ -156,30 +143,13 @@ def _divided(program: Program, block: Array, share: FloatArray) -> Program:
     normal = program.arc_normal[arc]
     centre[pick, normal] = (begin[block] + before[:, None] * (program.end - begin)[block])[on, normal]
     ends[last] = program.end[block[last]]
-    names = ("kind", "dwell", "line", "tolerance", "feed")
     control = program.path_control[block]
-    columns: dict[str, Any] = {name: getattr(program, name)[block] for name in names}
-    events = program.events
-    moved: Any = (
-        dataclasses.replace(events, block=first[events.block])
-        if isinstance(events, EventTable)
-        else [dataclasses.replace(each, block=int(first[each.block])) for each in events]
-    )
-    # arcs have their new rows first, so that `renumbered` finds the first part of each
-    parts = renumbered(
+    parts = divided(
         program,
-        lambda blocks: first[blocks],
+        block,
         end=ends,
         path_control=np.where(last | (control == PathControl.BLEND), control, PathControl.EXACT_PATH),
-        events=moved,
-        frame=program.frame[block] if len(program.frame) else program.frame,
-        extruded=(program.extruded[block] * (share - before)) if len(program.extruded) else program.extruded,
-        **columns,
+        **({"extruded": program.extruded[block] * (share - before)} if len(program.extruded) else {}),
     )
-    return dataclasses.replace(
-        parts,
-        arc_block=on,
-        arc_center=centre,
-        arc_normal=normal,
-        arc_sweep=program.arc_sweep[arc] * (share - before)[on],
-    )
+    sweep = program.arc_sweep[arc] * (share - before)[on]
+    return dataclasses.replace(parts, arc_block=on, arc_center=centre, arc_normal=normal, arc_sweep=sweep)

@@ -45,9 +45,8 @@ def codes_of(data: bytes, machine: Machine | None, source: str) -> Called:
     """The program of a CL file, its lines where the records stand. Raises InputError for a record that is not read,
     and for directions that the machine cannot have."""
     lines = data.decode("utf-8", "replace").replace("\r", "").split("\n")
-    units = re.search(rb"(?mi)^\s*UNITS\s*/\s*(MM|IN)", data) or re.search(
-        rb"(?mi)^\s*FEDRAT\b.*(MM|I)P[MR]", data
-    )
+    units = re.search(rb"(?mi)^\s*UNITS\s*/\s*(MM|IN)", data)
+    units = units or re.search(rb"(?mi)^\s*FEDRAT\b.*(MM|I)P[MR]", data)
     records = _Records(1.0 if units is None or units[1].upper() == b"MM" else MM_PER_INCH)
     text, codes = "", [""] * len(lines)
     for number, line in enumerate(lines, start=1):
@@ -67,9 +66,10 @@ def codes_of(data: bytes, machine: Machine | None, source: str) -> Called:
     return Called("\n".join(codes).encode(), np.arange(len(lines)) + 1, (), Counter(), {}, CL)
 
 
-def _turn(
-    codes: list[str], directions: dict[int, tuple[float, ...]], machine: Machine | None, source: str
-) -> None:
+Directions = dict[int, tuple[float, ...]]
+
+
+def _turn(codes: list[str], directions: Directions, machine: Machine | None, source: str) -> None:
     """Write the rotary axes' places into the moves, whose directions are known by line. Raises InputError."""
     if machine is None or not machine.kinematics:
         line = next(line for line, axis in directions.items() if axis != _UP)
@@ -77,10 +77,9 @@ def _turn(
         raise InputError(f"GOTO: {said}", source=source, line=line)
     chain, on = kinematics_of(machine), list(directions)
     angles = rotary_along(chain, np.array(list(directions.values())), machine.tolerance / machine.radius, on)
-    for line, places in zip(on, angles / RAD_PER_DEG, strict=True):
-        words = (
-            f"{c.upper()}{_text(round(float(v), 9))}" for c, v in zip(chain.data.rotary, places, strict=True)
-        )
+    letters = [c.upper() for c in chain.data.rotary]
+    for line, places in zip(on, (angles / RAD_PER_DEG).tolist(), strict=True):
+        words = (f"{c}{_text(round(v, 9))}" for c, v in zip(letters, places, strict=True))
         codes[line - 1] += " " + " ".join(words)
     codes[on[0] - 1] += " M128"
 
@@ -148,9 +147,8 @@ class _Records:
             return _CODES[word]
         if not word or f" {word} " in _STILL.replace("\n", " ") or word.startswith(_TEXTS):
             return ""
-        raise ValueError(
-            "a record that may move the tool and is not read; write the moves out in the CAM system, or give G code"
-        )
+        what = "a record that may move the tool and is not read"
+        raise ValueError(f"{what}; write the moves out in the CAM system, or give G code")
 
     def _place(self, line: int, word: str, numbers: list[float], count: int) -> str:
         """A record of places: GOTO and FROM with a direction or without, GODLTA, TLAXIS."""

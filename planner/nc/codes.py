@@ -67,6 +67,7 @@ M_GROUP: dict[int, str] = {
 }
 _STRAIGHT = "write the moves out as G0, G1, G2 and G3 (in the CAM system, or with a converter)"
 _POST = "give the machine a table of this axis, or choose a three-axis post-processor that writes G94 feeds in mm or inch per minute"
+_EXTRUDER = "give the machine a table [axes.e], or --extruder ignore to plan the other axes without it"
 _ANGLES = "choose a post-processor that writes the angles of the rotary axes, with G43.4"
 # Axes that are not planned: they may be named as long as they stand still.
 PARKABLE = "ABCUVW"
@@ -173,24 +174,23 @@ M_REFUSED: dict[int, Refusal] = {
 def unknown(letter: str, code: int, *, strict: bool) -> Refusal:
     """The refusal of a code that no table names; one that is not refused by `strict` alone may move. That it
     can be left out (--ignore) is not said: of a code that may move it would be the plan of another path."""
-    if letter == "M" and not strict:
+    if letter == "G":
+        return Refusal("a G code that RS274NGC does not know is", "write it with the codes of RS274NGC", True)
+    if not strict:
         what = "an M code that this reader does not know, and that may move with its words or by itself, is"
         return Refusal(what, "write what it moves as G0 or G1", True)
-    if letter == "M":
-        if 1000 <= code <= 1990:
-            return Refusal("a command that each machine defines for itself is", "remove it if nothing moves")
-        return Refusal("an M code that RS274NGC does not know is", "remove it if nothing moves")
-    return Refusal("a G code that RS274NGC does not know is", "write it with the codes of RS274NGC", True)
+    own = 1000 <= code <= 1990
+    what = (
+        "a command that each machine defines for itself" if own else "an M code that RS274NGC does not know"
+    )
+    return Refusal(f"{what} is", "remove it if nothing moves")
 
 
 # Letters that no supported code uses.
 LETTERS_REFUSED: dict[str, Refusal] = {
     **dict.fromkeys("ABC", Refusal("a rotary axis that moves is", _POST)),
     **dict.fromkeys("UVW", Refusal("a second linear axis that moves is", _POST)),
-    "E": Refusal(
-        "an extruder axis is",
-        "give the machine a table [axes.e], or --extruder ignore to plan the other axes without it",
-    ),
+    "E": Refusal("an extruder axis is", _EXTRUDER),
     "O": Refusal("a subprogram or O word is", "write its blocks out, or remove a mere program number"),
 }
 

@@ -34,10 +34,8 @@ from planner.nc.state import State
 NOWHERE = 1e-9  # a move that is shorter stays where it is [mm]: the rounding of coordinates around 1e3 mm
 STRAIGHT_ON = 0.05  # [rad], as LinuxCNC has it, found by bisection on it
 _ROUNDING = 1e-6  # of an angle where an arc's ends are not on one circle [rad]
-_GOUGE = (
-    "the inner corner before this move takes more of a move than there is: the tool would gouge; correct the path or take a "
-    "smaller tool"
-)
+_WHY = "the inner corner before this move takes more of a move than there is: the tool would gouge"
+_GOUGE = f"{_WHY}; correct the path or take a smaller tool"
 
 
 @dataclass(frozen=True)
@@ -61,9 +59,8 @@ class OffsetMove:
 
 def meeting(before: OffsetMove, after: OffsetMove, sense: float) -> complex | None:
     """Where two offset moves cross in a sense (the sign of the turn from the one to the other), or None."""
-    crossing = [
-        p for p in _crossings(before, after) if cross(before.tangent(p), after.tangent(p)) * sense > 0
-    ]
+    both = ((p, cross(before.tangent(p), after.tangent(p))) for p in _crossings(before, after))
+    crossing = [p for p, turn in both if turn * sense > 0]
     return min(crossing, key=lambda p: abs(p - before.end)) if crossing else None
 
 
@@ -122,9 +119,7 @@ class _Open:
 class Cutter:
     """The compensation in force, from G41 or G42 to G40; it writes its moves into the table of blocks.
 
-    radius : of the tool [mm], > 0
-    left   : on which side of the path it is, kept as a `sign`
-    normal : axis normal to the plane
+    radius : of the tool [mm], > 0;  left : on which side of the path it is;  normal : axis normal to the plane
     """
 
     def __init__(self, state: State, table: BlockTable, *, radius: float, left: bool, normal: int):
@@ -213,15 +208,13 @@ class Cutter:
         outer = around if back else turn < -STRAIGHT_ON
         inner = not outer and (back or turn > STRAIGHT_ON)
         if inner:
-            self._inner_corner(side)
+            self._inner_corner(self._open, side)
         self._settle(self._open)
         if outer:
             self._outer_corner(corner, self._beside(corner, side.first), kind, line)
         return inner
 
-    def _inner_corner(self, side: OffsetMove) -> None:
-        open_ = self._open
-        assert open_ is not None
+    def _inner_corner(self, open_: _Open, side: OffsetMove) -> None:
         point = meeting(open_.side, side, self.sign)
         if point is None:
             raise CutterFault(_GOUGE)
@@ -241,7 +234,6 @@ class Cutter:
         """To the offset start of the next move: about the corner, or straight before a rapid."""
         state = self._state
         place = self._at(end, state.place)
-        self._table.make_room(2)
         if kind == Kind.RAPID:
             state.actual = place
             self._table.add(Kind.RAPID, line, state)
@@ -264,7 +256,6 @@ class Cutter:
         begin, before = self._plane(state.place), state.place
         state.position[:] = target
         state.actual = self._at(side.end, target)
-        table.make_room(2)
         row, arc = table.blocks, -1
         if kind == Kind.ARC:
             arc = len(table.arcs)
@@ -305,7 +296,6 @@ class Cutter:
         place = self._plane(state.place)
         state.position[:] = target
         state.actual = self._at(place, target)
-        self._table.make_room(1)
         if self._open is not None and self._open.row < 0:
             self._open.row = self._table.blocks
         self._table.add(kind, line, state)

@@ -9,10 +9,8 @@ G91, from the level before the series of cycles (R), from R (the depth) and from
 
 They stay in force while the same code does. The tool goes to the hole at the height where it is if that is
 above R, else at the one it will retract to; then fast to R, makes the hole, and retracts to R (G99) or to the
-level before the series (G98), if that is higher.
-
-`_STEPS` says what each cycle does there. Between pecks the tool goes up by `CLEARANCE` (G73), or to R and back
-to `CLEARANCE` above the last depth. At G88 the operator retracts, and the plan has a rapid for it.
+level before the series (G98), if that is higher. Between pecks it goes up by `CLEARANCE` (G73), or to R and back
+to `CLEARANCE` above the last depth.
 """
 
 from collections.abc import Iterator
@@ -25,7 +23,7 @@ from planner.nc import auxiliary, codes
 from planner.nc.arcs import AXES, IN_PLANE
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
-from planner.nc.moves import Block, WordFault, integer, unused
+from planner.nc.moves import Block, integer, unused
 from planner.nc.program import Kind
 from planner.nc.state import CycleSeries, State
 
@@ -53,6 +51,12 @@ _STEPS = {
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _DEEP, _BACK_BORE, _BY_HAND = 830, 870, 880  # G83, G87, G88
 _GROUP = "K of G73"  # among the words in force
+_SAID = {  # by code
+    _BY_HAND: "the operator retracts the tool after the full stop; the plan has a rapid for it",
+    codes.THREADING: "the spindle stops in its place at the bottom, and the way off the wall by Q is left out",
+}
+_MEANING = {"R": "R, where its feed begins", "P": "P, its dwell in seconds", "Q": "Q, the depth of a peck"}
+_OFFSETS = "the offsets I J K, for Fanuc's Q goes where a parameter of the control says"
 _PECK_ODD = 10.0  # times the depth of a hole: a longer peck is most likely in other units
 _PER_HOLE = 16  # steps of a hole without pecks, at most
 _PER_PECK = 3  # down, out and back in
@@ -61,21 +65,20 @@ _ROUNDING = 1e-9  # of a position that is turned back into a coordinate [program
 
 @dataclass(frozen=True)
 class Hole:
-    """A hole in programmed coordinates and units, in which pecks add up as in the control: in the plane
-    (a, b), along its normal c."""
+    """A hole in programmed coordinates and units, in the plane (a, b) and along its normal c."""
 
     code: int  # tenths of the G code
     place: tuple[float, float]  # (a, b)
     bottom: float  # c of its depth
     clear: float  # c of R
     retract: float  # c after it
-    peck: float = 0.0  # Q, or I of G83, of which each is J (`less`) less, down to K (`least`);  dwell : P [s]
+    peck: float = 0.0  # Q, or I of G83, of which each is J (`less`) less, down to K (`least`)
     less: float = 0.0
     least: float = 0.0
     group: float = 0.0  # K of Haas' G73: pecks of this depth together end at R
-    dwell: float = 0.0
-    beside: tuple[float, float] = (0.0, 0.0)  # (a, b) offset of G87;  counterbore : c of its K
-    counterbore: float = 0.0
+    dwell: float = 0.0  # P [s]
+    beside: tuple[float, float] = (0.0, 0.0)  # (a, b) offset of G87
+    counterbore: float = 0.0  # c of K of G87
     turning: int = 1  # of the spindle, 1 or -1
     fast: bool = False  # out of the hole it feeds to R only, as on Fanuc's controls
     unit: float = 1.0  # of length [mm]
@@ -94,23 +97,23 @@ class CycleStep:
 def steps(hole: Hole) -> Iterator[CycleStep]:
     """The steps of a hole, from above it at R on."""
     a, b = hole.place
-    aside = a + hole.beside[0], b + hole.beside[1]
-    codes_as_before = (3, 4) if hole.turning > 0 else (4, 3)
+    beside, bottom = (a + hole.beside[0], b + hole.beside[1]), hole.bottom
+    again, other = (3, 4) if hole.turning > 0 else (4, 3)
     step = {
-        "down": CycleStep(Kind.LINE, (a, b, hole.bottom)),
+        "down": CycleStep(Kind.LINE, (a, b, bottom)),
         "back": CycleStep(Kind.LINE, (a, b, hole.clear)),
         "out": CycleStep(Kind.LINE, (a, b, hole.clear if hole.fast else hole.retract)),
         "counterbore": CycleStep(Kind.LINE, (a, b, hole.counterbore)),
         "up": CycleStep(Kind.RAPID, (a, b, hole.retract)),
-        "beside": CycleStep(Kind.RAPID, (*aside, hole.clear)),
-        "deep": CycleStep(Kind.RAPID, (*aside, hole.bottom)),
-        "in": CycleStep(Kind.RAPID, (a, b, hole.bottom)),
-        "away": CycleStep(Kind.RAPID, (*aside, hole.retract)),
+        "beside": CycleStep(Kind.RAPID, (*beside, hole.clear)),
+        "deep": CycleStep(Kind.RAPID, (*beside, bottom)),
+        "in": CycleStep(Kind.RAPID, (a, b, bottom)),
+        "away": CycleStep(Kind.RAPID, (*beside, hole.retract)),
         "dwell": CycleStep(Kind.DWELL, seconds=hole.dwell),
         "halt": CycleStep(Kind.STOP),
         "stop": CycleStep(None, spindle=5),
-        "again": CycleStep(None, spindle=codes_as_before[0]),
-        "other": CycleStep(None, spindle=codes_as_before[1]),
+        "again": CycleStep(None, spindle=again),
+        "other": CycleStep(None, spindle=other),
     }
     for name in _STEPS[hole.code].split():
         if name != "dwell" or hole.dwell or hole.code not in FANUC_DWELLS:
@@ -148,8 +151,12 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
     _check_words(state, block, words, findings)
     hole = _hole(state, block, series, words)
     repeats = _repeats(state, block, hole)
+
+    def go(kind: Kind, place: tuple[float, float, float]) -> None:
+        _to(state, table, block.line, CycleStep(kind, place))
+
     if repeats and series.level < hole.clear - _ROUNDING:
-        _to(state, table, block.line, CycleStep(Kind.RAPID, (here[a], here[b], hole.clear)))
+        go(Kind.RAPID, (here[a], here[b], hole.clear))
         here[c] = hole.clear
     for _ in range(repeats):
         for axis in (a, b):
@@ -158,8 +165,8 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
                 here[axis] = length + (0.0 if state.absolute else here[axis])
         hole = replace(hole, place=(float(here[a]), float(here[b])))
         height = float(here[c]) if here[c] > hole.clear + _ROUNDING else hole.retract
-        _to(state, table, block.line, CycleStep(Kind.RAPID, (*hole.place, height)))
-        _to(state, table, block.line, CycleStep(Kind.RAPID, (*hole.place, hole.clear)))
+        go(Kind.RAPID, (*hole.place, height))
+        go(Kind.RAPID, (*hole.place, hole.clear))
         for step in steps(hole):
             _to(state, table, block.line, step)
         here[c] = hole.retract
@@ -171,19 +178,20 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
 
 def _check_words(state: State, block: Block, words: dict[str, float], findings: Findings) -> None:
     """Raises WordFault for an impossible peck or dwell, and a spindle that does not turn as it must."""
-    code, word = state.motion, block.motion_word()
-    name = f"G{codes.number(code)}"
-    if code in PECKING and not min(_infeeds(words, state)[c] for c in ("peck", "least")) > 0:
-        raise WordFault(block.at.get("Q", word), f"{name} needs the depth of a peck as a Q word above 0")
-    if code in DWELLING and words["P"] < 0:
-        raise block.fault("a dwell must not be negative; write its seconds, such as P0.5", "P")
+    code, name = state.motion, f"G{codes.number(state.motion)}"
+    if code in PECKING:
+        least = min(_infeeds(words, state)[c] for c in ("peck", "least"))
+        text = f"{name} needs the depth of a peck as a Q word above 0"
+        block.require(least > 0, text, "Q" * ("Q" in block.at))
+    text = "a dwell must not be negative; write its seconds, such as P0.5"
+    block.require(code not in DWELLING or words["P"] >= 0, text, "P")
     if state.fanuc and code in TAPPING.keys() | STOPPING and (code in TAPPING or not state.spindle.turning):
         state.spindle.turning = TAPPING.get(code, 1)  # the cycle starts it
-    turning, needed = state.spindle.turning, TAPPING.get(code)
-    if needed is not None and turning != needed:
-        raise WordFault(word, f"{name} needs the spindle turning {'M3' if needed > 0 else 'M4'} before it")
-    if code in STOPPING and not turning:
-        raise WordFault(word, f"{name} stops the spindle, which does not turn; write M3 or M4 before it")
+    turning, needed = state.spindle.turning, TAPPING.get(code, 0)
+    text = f"{name} needs the spindle turning {'M3' if needed > 0 else 'M4'} before it"
+    block.require(needed in (0, turning), text)
+    text = f"{name} stops the spindle, which does not turn; write M3 or M4 before it"
+    block.require(code not in STOPPING or bool(turning), text)
     if "P" in block.value and code in DWELLING | TAPPING.keys():
         auxiliary.assume_seconds(state, block, words["P"], findings)
     state.cycle_dwell = block.value.get("P", state.cycle_dwell)
@@ -196,9 +204,8 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
     absolute = state.absolute or state.fanuc
     clear = words["R"] + (0.0 if absolute else series.level)
     bottom = words["XYZ"[axis]] + (0.0 if absolute else clear)
-    if bottom > clear:
-        name, depth = f"G{codes.number(state.motion)}", f"{AXES[axis].upper()} = {bottom:g}"
-        raise block.fault(f"{name} would begin at R = {clear:g}, below its depth {depth}; write R above it")
+    what = f"G{codes.number(state.motion)} would begin at R = {clear:g}, below its depth"
+    block.require(bottom <= clear, f"{what} {AXES[axis].upper()} = {bottom:g}; write R above it")
     return Hole(
         state.motion,
         (0.0, 0.0),
@@ -228,9 +235,8 @@ def _repeats(state: State, block: Block, hole: Hole) -> int:
     count = next((c for c in "LK" if c in block.value and (c == "L" or _counts(state, block))), "")
     repeats = integer(block, count, 0 if state.fanuc else 1) if count else 1
     pecks = (hole.clear - hole.bottom) / hole.least if hole.code in PECKING else 0.0
-    if repeats * (_PER_HOLE + _PER_PECK * pecks) > STEPS_MAX:
-        wrong = "Q" if pecks else "L"
-        raise block.fault(f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {wrong}")
+    text = f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}"
+    block.require(repeats * (_PER_HOLE + _PER_PECK * pecks) <= STEPS_MAX, text)
     return repeats
 
 
@@ -247,25 +253,18 @@ def _groups(state: State, block: Block) -> bool:
 
 
 def _say(state: State, block: Block, findings: Findings) -> None:
-    name, word = f"G{codes.number(state.motion)}", block.motion_word()
+    name, word, code = f"G{codes.number(state.motion)}", block.motion_word(), state.motion
     if not state.retract_given:
-        at = (
-            "the level before them (G98), as Fanuc and Haas have it"
-            if state.fanuc
-            else "R (G99), as LinuxCNC has it"
-        )
+        at = "R (G99), as LinuxCNC has it"
+        at = "the level before them (G98), as Fanuc and Haas have it" if state.fanuc else at
         text = f"holes end at {at}; some controls start with G9{9 if state.fanuc else 8}"
         findings.assume(f"{name} before any G98 or G99: {text}", block.line, word)
     if _groups(state, block):
         text = f"K{block.value['K']:g} beside Q is the depth after which it retracts to R, as Haas has it"
         findings.assume(f"{name}: {text}; Fanuc would drill the hole again", block.line, block.at["K"])
-    if state.motion == _BY_HAND:
-        text = "the operator retracts the tool after the full stop; the plan has a rapid for it"
-        findings.assume(f"{name}: {text}", block.line, word)
-    if state.motion == codes.THREADING:
-        text = "the spindle stops in its place at the bottom, and the way off the wall by Q is left out"
-        findings.assume(f"{name}: {text}", block.line, word)
-    if state.motion in TAPPING:
+    if code in _SAID:
+        findings.assume(f"{name}: {_SAID[code]}", block.line, word)
+    if code in TAPPING:
         text = "planned with F as its upper limit and full stops at both ends, not at constant feed"
         findings.assume(f"{name} is synchronised with the spindle: {text}", block.line)
 
@@ -289,21 +288,15 @@ def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
     own = state.fanuc and code == _DEEP and "I" in series.words  # infeeds of its own
     needed += "Q" * (code in PECKING and not own) + "P" * (code in DWELLING)
     for letter in needed:
-        if letter not in series.words:
-            raise block.fault(f"G{codes.number(code)} needs {_meaning(letter)}")
+        what = f"its depth as {letter}" if letter in "XYZ" else f"{letter}: {_OFFSETS}"
+        what = _MEANING.get(letter, what)
+        block.require(letter in series.words, f"G{codes.number(code)} needs {what}")
     words = dict(series.words)
     words[axis] = _length(state, words, state.normal)
     return words
 
 
-def _meaning(letter: str) -> str:
-    what = {"R": "R, where its feed begins", "P": "P, its dwell in seconds", "Q": "Q, the depth of a peck"}
-    offsets = f"{letter}: the offsets I J K, for Fanuc's Q goes where a parameter of the control says"
-    return what.get(letter, f"its depth as {letter}" if letter in "XYZ" else offsets)
-
-
 def _to(state: State, table: BlockTable, line: int, step: CycleStep) -> None:
-    table.make_room(1)
     if step.kind is None:
         table.add_event("M", step.spindle, line)
         state.spindle.turning = auxiliary.TURNING[10 * step.spindle]

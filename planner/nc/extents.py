@@ -151,20 +151,15 @@ def travel_faults(
             )
         else:
             continue
-        column = _column(lines, int(program.line[first]), letter)
-        faults.append(
-            Fault(int(program.line[first]), column, letter.upper(), f"{said}; --ignore-travel plans it")
-        )
+        line = int(program.line[first])
+        found = re.search(letter.encode(), lines[line - 1], re.IGNORECASE) if line <= len(lines) else None
+        column = found.start() + 1 if found else 1
+        faults.append(Fault(line, column, letter.upper(), f"{said}; --ignore-travel plans it"))
     if not known:
         mixed = any(NO_G54 in text for text in program.assumptions)
-        notes.append(
-            "travel: the machine file has no G54 ([work_offsets.g54]), so "
-            + (
-                "nothing is compared: the program mixes both coordinates"
-                if mixed
-                else "only lengths are compared"
-            )
-        )
+        both = "nothing is compared: the program mixes both coordinates"
+        compared = both if mixed else "only lengths are compared"
+        notes.append(f"travel: the machine file has no G54 ([work_offsets.g54]), so {compared}")
         faults = [] if mixed else faults
     return sorted(faults, key=lambda fault: fault.line), notes
 
@@ -180,10 +175,8 @@ def travel_of(machine: Machine | None, letter: str) -> tuple[float, float]:
     axis = machine.axes.get(letter) if machine else None
     if axis is None or axis.wrapped:
         return -np.inf, np.inf
-    return (
-        -np.inf if axis.travel_min is None else axis.travel_min,
-        np.inf if axis.travel_max is None else axis.travel_max,
-    )
+    low, high = axis.travel_min, axis.travel_max
+    return -np.inf if low is None else low, np.inf if high is None else high
 
 
 def _of_joints(program: Program, machine: Machine) -> tuple[FloatArray, FloatArray]:
@@ -202,14 +195,7 @@ def _of_joints(program: Program, machine: Machine) -> tuple[FloatArray, FloatArr
 
 
 def _named_before(lines: list[bytes], line: int, letter: str) -> bool:
-    """Whether a program moves an axis, if only to where it is, before a line: its start is a place of the program
-    then, and not only assumed."""
+    """Whether a program names an axis before a line: its start is a place of it then, and not assumed."""
     word = re.compile(rb"(?<![A-Z#<])" + letter.encode() + rb"\s*[-+=\d.\[#]", re.IGNORECASE)
     words = (_COMMENT.sub(b"", text) for text in lines[: line - 1])
     return any(word.search(text) and not _SETS.search(text) for text in words)
-
-
-def _column(lines: list[bytes], line: int, letter: str) -> int:
-    """The column of an axis' word on a line, from 1; 1 where it has none."""
-    found = re.search(letter.encode(), lines[line - 1], re.IGNORECASE) if line <= len(lines) else None
-    return found.start() + 1 if found else 1

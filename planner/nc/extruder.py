@@ -168,18 +168,17 @@ def _with_stops(program: Program, extruded: FloatArray, at: Array, line: Array, 
         return block + np.searchsorted(at, block, side="right")
 
     before = np.maximum(at - 1, 0)
-    place = np.vstack([program.start, program.end])[at]
+    control, tolerance = program.path_control, program.tolerance
     columns: dict[str, Any] = {
         "kind": put(program.kind, Kind.STOP),
-        "end": put(program.end, place),
+        "end": put(program.end, np.vstack([program.start, program.end])[at]),
         "feed": put(program.feed, alone.feed),
         "dwell": put(program.dwell, 0.0),
         "line": put(program.line, line),
         "extruded": put(extruded, alone.amount),
+        "path_control": put(control, control[before] if len(program) else 0.0),
+        "tolerance": put(tolerance, tolerance[before] if len(program) else np.nan),
     }
-    for name, where_none in (("path_control", 0.0), ("tolerance", np.nan)):
-        old = getattr(program, name)
-        columns[name] = put(old, old[before] if len(program) else where_none)
     events = program.events
     if isinstance(events, EventTable):
         low, high = (np.searchsorted(at, events.block, side=side) for side in ("left", "right"))

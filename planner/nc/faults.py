@@ -25,19 +25,13 @@ READ, REFUSED, LEFT_OUT, PARKED, AXIS = range(5)
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One construct that is not supported or not valid.
-
-    line, column : 1-based place in the source
-    word         : the word found, as it is written
-    message      : what it is, what is allowed and what to do
-    source       : name of the file, if it is not the main program's
-    """
+    """One construct that is not supported or not valid."""
 
     line: int
-    column: int
-    word: str
-    message: str
-    source: str = ""
+    column: int  # 1-based, as `line`
+    word: str  # the word found, as it is written
+    message: str  # what it is, what is allowed and what to do
+    source: str = ""  # name of the file, if it is not the main program's
 
     def __str__(self) -> str:
         return f"{self.word}: {self.message}" if self.word else self.message
@@ -60,13 +54,12 @@ class FaultList(MadeWhenAsked[Fault]):
 
 
 class Note(NamedTuple):
-    """A note, its line, whether it is an assumption that may change geometry or time, and whether it comes before
-    the others, because the path may be another one altogether."""
+    """A note."""
 
     line: int
     text: str
-    changes: bool
-    grave: bool = False
+    changes: bool  # an assumption that may change geometry or time
+    grave: bool = False  # it comes before the others, because the path may be another one altogether
 
 
 class Notes(NamedTuple):
@@ -77,8 +70,7 @@ class Notes(NamedTuple):
 
 
 class Findings:
-    """Findings while a program is read in chunks: faults by word, assumptions that may change geometry or
-    time, and other notes."""
+    """What is found while a program is read in chunks."""
 
     def __init__(self, *, strict: bool = False) -> None:
         self.strict = strict  # such assumptions are faults
@@ -121,20 +113,12 @@ class Findings:
 
     def notes(self, more: Sequence[Note]) -> Notes:
         """Assumptions and notes, each once with its first line and how often, and `more`, by line."""
-        found = [
-            Note(
-                line,
-                f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}",
-                changes,
-                text in self._grave,
-            )
-            for (changes, text), (line, times) in self._notes.items()
-        ]
+        found = []
+        for (changes, text), (line, times) in self._notes.items():
+            said = f"line {line}: {text}{f' ({times} times)' if times > 1 else ''}"
+            found.append(Note(line, said, changes, text in self._grave))
         ordered = sorted([*found, *more], key=lambda note: (not note.grave, note.line))
-        return Notes(
-            tuple(note.text for note in ordered if note.changes),
-            tuple(note.text for note in ordered if not note.changes),
-        )
+        return Notes(*(tuple(n.text for n in ordered if n.changes == changes) for changes in (True, False)))
 
 
 def require_none(faults: Sequence[Fault], source: str) -> None:
@@ -142,9 +126,7 @@ def require_none(faults: Sequence[Fault], source: str) -> None:
     if not faults:
         return
     first, more = faults[0], len(faults) - 1
-    text = str(first)
-    if more:
-        text += f" ({more} more in this program; 'planner info' shows them)"
+    text = str(first) + (f" ({more} more in this program; 'planner info' shows them)" if more else "")
     raise InputError(text, source=first.source or source, line=first.line, column=first.column)
 
 
@@ -156,28 +138,24 @@ class _Counted:
 
 
 class IgnoredWords:
-    """Assumptions so far in one program.
-
-    treatment : (256,) uint8, `READ`, `REFUSED`, `LEFT_OUT`, `PARKED` or `AXIS` (of the machine) by letter
-    parked    : (256,) where an axis that is not planned stands, by letter; NaN before its first word
-    moved     : letters of axes that are not planned and were refused, because they move
-    printer   : the program is one for a 3-D printer (printer.py)
-    follows   : E words are those of an extruder of the machine (extruder.py); nothing is said of them
-    at_tip    : the machine has kinematics: the switch of the tool centre point is read (tool_point.py)
-    """
+    """Assumptions so far in one program."""
 
     def __init__(self, reading: Reading, axes: str = "", *, extruder: bool = False, at_tip: bool = False):
-        self.reading, self.at_tip = reading, at_tip
+        self.reading = reading
+        self.at_tip = at_tip  # the machine has kinematics: the switch of the tool centre point is read
+        # E words are those of an extruder of the machine (extruder.py); nothing is said of them
         self.follows = extruder and reading.extruder != IGNORE
         self.strict = reading.strict
-        self.printer = False
+        self.printer = False  # the program is one for a 3-D printer (printer.py)
         self.extruder = ""  # the last T word of a printer
         self.retractions: list[Retraction] = []  # that a printer's program sets
+        # where axes that are not planned stand, by letter; NaN before a word
         self.parked = np.full(256, np.nan)
-        self.treatment = np.full(256, READ, dtype=np.uint8)
+        self.treatment = np.full(256, READ, dtype=np.uint8)  # by letter
         for letter in LETTERS_REFUSED:
             self.treatment[ord(letter)] = AXIS if letter in axes else self._treatment(letter)
         self._counted: dict[Assumption, _Counted] = {}
+        # letters of axes that are not planned and were refused, because they move
         self.moved: set[str] = set()
         self._used: dict[str, int] = {}
 
@@ -206,8 +184,7 @@ class IgnoredWords:
         turning = (self.treatment[[ord(letter) for letter in "ABC"]] == AXIS).any()
         if turning and word.upper().lstrip("M0") in ("128", "428"):
             what = TOOL_POINT_M
-        found = self._counted.setdefault(what, _Counted(0, word, line))
-        found.times += times
+        self._counted.setdefault(what, _Counted(0, word, line)).times += times
 
     def ignores(self, name: str) -> bool:
         """True if the user said that a code or command is harmless."""
@@ -240,24 +217,21 @@ class IgnoredWords:
                 self.count(self._of_letter(chr(code)), words.text(word), line, times)
 
     def _of_letter(self, letter: str) -> Assumption:
-        parked = bool(self.treatment[ord(letter)] == PARKED)
-        if parked:
-            at = self.parked[ord(letter)]
+        name, at = f"{letter} word{{|s}}", self.parked[ord(letter)]
+        if self.treatment[ord(letter)] == PARKED:
             where = "" if np.isnan(at) else f" at {plain(float(at))}"
-            meaning = f"axis {letter} is assumed to stand still{where}"
-        elif letter == "E":
-            asked = self.reading.extruder == IGNORE
-            why = "--extruder ignore" if asked else "the machine file has no table [axes.e]"
-            text = f"left out ({why}); what the extruder does by itself takes no time in this plan"
-            return Assumption("E word{|s}", text, changes=not asked)
-        else:
-            meaning = "left out, as --ignore says: the plan knows nothing of this axis"
-        return Assumption(f"{letter} word{{|s}}", meaning, changes=parked)
+            return Assumption(name, f"axis {letter} is assumed to stand still{where}", changes=True)
+        if letter != "E":
+            return Assumption(name, "left out, as --ignore says: the plan knows nothing of this axis")
+        asked = self.reading.extruder == IGNORE
+        why = "--extruder ignore" if asked else "the machine file has no table [axes.e]"
+        text = f"left out ({why}); what the extruder does by itself takes no time in this plan"
+        return Assumption(name, text, changes=not asked)
 
     def notes(self) -> list[Note]:
         """Everything that was assumed, by its first line."""
         notes = []
-        for what, found in self._counted.items():
-            text = f"{what.named(found.times)}: {what.meaning}; first {found.word} line {found.line}"
-            notes.append(Note(found.line, text, what.changes))
+        for what, of in self._counted.items():
+            text = f"{what.named(of.times)}: {what.meaning}; first {of.word} line {of.line}"
+            notes.append(Note(of.line, text, what.changes))
         return notes

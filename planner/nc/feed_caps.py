@@ -12,6 +12,7 @@ Feeds are in the program's units, mm or inches per minute. Where rows overlap th
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,19 +29,16 @@ _LINE_MAX = 2**31 - 1  # lines are kept in 32 bits
 
 @dataclass(frozen=True, kw_only=True)
 class FeedCaps:
-    """The K rows of a file of feed caps.
-
-    row     : (K,) their lines in the file, from 1
-    columns : (K,) each by its name: `line`, or `from_mm` and `to_mm` [mm], and `feed` [the program's unit/min]
-    files   : (K,) what `file` says, "" for the program; () without that column
-    main    : another name of the program, which it had when it was planned
-    """
+    """The K rows of a file of feed caps."""
 
     source: str
     text: bytes
-    row: Array = field(compare=False, repr=False)
+    row: Array = field(compare=False, repr=False)  # (K,) their lines in the file, from 1
+    # (K,) each by its name: `line`, or `from_mm` and `to_mm` [mm], and `feed` [the program's unit/min]
     columns: dict[str, FloatArray] = field(compare=False, repr=False)
+    # (K,) of `file`, "" for the program; or ()
     files: tuple[str, ...] = field(compare=False, repr=False, default=())
+    # another name of the program, which it had when it was planned
     main: str = field(compare=False, default="")
 
     def __str__(self) -> str:
@@ -74,18 +72,13 @@ def read_feed_caps(path: str | Path) -> FeedCaps:
     if names not in TABLES:
         what = f"the first line is '{head[:60]}'; it names the columns: {_ALLOWED}"
         raise InputError(what, source=source, line=1, column=1)
-    numbers: list[list[float]] = []
-    files, lines = [], []
-    for number, row in enumerate(rows[1:], start=2):
-        if row.strip():
-            file, values = _values(row, names, source, number)
-            files += [file] if names[0] == FILE else []
-            numbers.append(values)
-            lines.append(number)
-    if not numbers:
+    given = [(n, *_values(row, names, source, n)) for n, row in enumerate(rows[1:], start=2) if row.strip()]
+    if not given:
         raise InputError("there is no row below the names of the columns", source=source, line=1, column=1)
+    lines, files, numbers = zip(*given, strict=True)
     columns = dict(zip(names[-len(numbers[0]) :], np.array(numbers).T, strict=True))
-    return FeedCaps(source=source, text=text, row=np.array(lines), columns=columns, files=tuple(files))
+    files = files if names[0] == FILE else ()
+    return FeedCaps(source=source, text=text, row=np.array(lines), columns=columns, files=files)
 
 
 def _values(row: str, names: tuple[str, ...], source: str, line: int) -> tuple[str, list[float]]:
@@ -97,25 +90,20 @@ def _values(row: str, names: tuple[str, ...], source: str, line: int) -> tuple[s
     file, column = "", 1
     values: list[float] = []
     for name, text in zip(names, fields, strict=True):
-        word = text.strip().strip('"')
-        try:
-            value = float(word) if name != FILE else math.nan
-        except ValueError:
-            value = math.nan
+        word, value = text.strip().strip('"'), math.nan
+        with suppress(ValueError):
+            value = float(word)
         least = values[-1] if name == TO else 0.0
-        if name == FILE:
-            wrong = "" if word else "the name of the program or of a file that it calls"
-        elif name == LINE:
-            wrong = "" if value % 1.0 == 0.0 and 1.0 <= value <= _LINE_MAX else "a line number, 1 or more"
-        elif name == FROM:
-            wrong = "" if least <= value < math.inf else "a length in mm, 0 or more"
-        else:
-            unit = "length in mm" if name == TO else "feed in the program's mm/min or inch/min"
-            wrong = "" if least < value < math.inf else f"a {unit}, above {least:g}"
-        if wrong:
-            raise InputError(
-                f"{name} is '{word[:40]}'; it must be {wrong}", source=source, line=line, column=column
-            )
+        good, allowed = {
+            FILE: (bool(word), "the name of the program or of a file that it calls"),
+            LINE: (value % 1.0 == 0.0 and 1.0 <= value <= _LINE_MAX, "a line number, 1 or more"),
+            FROM: (0.0 <= value < math.inf, "a length in mm, 0 or more"),
+            TO: (least < value < math.inf, f"a length in mm, above {least:g}"),
+            FEED: (0.0 < value < math.inf, "a feed in the program's mm/min or inch/min, above 0"),
+        }[name]
+        if not good:
+            what = f"{name} is '{word[:40]}'; it must be {allowed}"
+            raise InputError(what, source=source, line=line, column=column)
         if name == FILE:
             file = word
         else:

@@ -42,53 +42,33 @@ _NOWHERE = 1e-9  # a move shorter than this turns no corner [mm]: the rounding o
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ProgramInfo:
-    """Lengths [mm], times [s], feeds [mm/s]; NaN where there is nothing to measure.
+    """Lengths [mm], times [s], feeds [mm/s]; NaN where there is nothing to measure."""
 
-    source           : file name
-    assumptions      : what was assumed and may change geometry or time
-    lines            : source lines
-    blocks           : number of blocks by `Kind` name, in lower case; "spline" only where there are some
-    full_circles     : arcs of a full turn and more;  helices : arcs that rise along their axis
-    events           : number of events by letter or code ("S", "T", "M3" ...)
-    extent_min, _max : (A,) box around the start and all motion, arcs and splines included, in machine
-                       coordinates [mm, rad]
-    work_extent      : (3,) ends of that box, without the start, as the program has them; None for the same
-    length           : path length by kind "rapid", "line", "arc", and "spline" where there are some [mm]
-    feed             : (least, largest) programmed feed [mm/s]; inf where a plotter file gives none
-    feed_changes     : number of feed moves whose feed differs from the one before
-    segment_length   : quantiles LENGTH_QUANTILES of the feed moves' lengths [mm]
-    corners          : number of corners that turn by more than each of CORNER_DEGREES
-    zero_moves       : moves that end where they start
-    dwell            : sum of all dwells [s]
-    tools            : tool numbers in the order of their T words
-    notes            : what the reader says of it, `assumptions` first
-    expansion        : what was expanded: calls, turns of loops, lines executed; None where nothing was
-    tool_point       : where the tool centre point is on; None where x, y and z are those of the joints
-    unsupported      : every construct that is not supported or not valid
-    """
-
-    source: str
-    assumptions: tuple[str, ...]
-    lines: int
-    blocks: dict[str, int]
-    full_circles: int
-    helices: int
-    events: dict[str, int]
-    extent_min: FloatArray
-    extent_max: FloatArray
+    source: str  # file name
+    assumptions: tuple[str, ...]  # what was assumed and may change geometry or time
+    lines: int  # source lines
+    blocks: dict[str, int]  # by `Kind` name, in lower case; "spline" only where there are some
+    full_circles: int  # arcs of a full turn and more
+    helices: int  # arcs that rise along their axis
+    events: dict[str, int]  # by letter or code ("S", "T", "M3" ...)
+    extent_min: FloatArray  # (A,) least of the start and all motion, in machine coordinates [mm, rad]
+    extent_max: FloatArray  # (A,) and the greatest
+    # (3,) ends of that box, without the start, as the program has them; None for the same
     work_extent: tuple[FloatArray, FloatArray] | None
+    # path length by kind "rapid", "line", "arc", and "spline" where there are some [mm]
     length: dict[str, float]
-    feed: tuple[float, float]
-    feed_changes: int
-    segment_length: tuple[float, ...]
-    corners: dict[float, int]
-    zero_moves: int
-    dwell: float
-    tools: tuple[int, ...]
-    notes: tuple[str, ...]
+    feed: tuple[float, float]  # least and largest programmed feed [mm/s]; inf where a plotter file gives none
+    feed_changes: int  # feed moves whose feed differs from the one before
+    segment_length: tuple[float, ...]  # quantiles LENGTH_QUANTILES of the feed moves' lengths [mm]
+    corners: dict[float, int]  # how many turn by more than each of CORNER_DEGREES
+    zero_moves: int  # moves that end where they start
+    dwell: float  # sum of all dwells [s]
+    tools: tuple[int, ...]  # tool numbers in the order of their T words
+    notes: tuple[str, ...]  # what the reader says of it, `assumptions` first
+    # what was expanded: calls, turns of loops, lines executed; None where nothing was
     expansion: Expansion | None
-    tool_point: ToolPoint | None
-    unsupported: Sequence[Fault]
+    tool_point: ToolPoint | None  # where the tool centre point is on; None where x, y and z are of the joints
+    unsupported: Sequence[Fault]  # every construct that is not supported or not valid
 
 
 def inspect_program(
@@ -150,7 +130,13 @@ def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: A
         tangent[k, axes[0]] = -spoke[1] * program.arc_sweep / size
         tangent[k, axes[1]] = spoke[0] * program.arc_sweep / size
         tangent[k, n] = rise(program) / size
-    _set_spline_tangents(program, leaving, arriving)
+    splines = program.splines
+    blocks, first = np.unique(splines.block, return_index=True)
+    last = np.append(first[1:], len(splines)) - 1
+    _, rate, _ = at(homogeneous(splines.points, splines.weights), np.array([0.0, 1.0]))
+    for tangent, row, end in ((leaving, first, 0), (arriving, last, 1)) if len(splines) else ():
+        size = np.linalg.norm(rate[row, end], axis=1, keepdims=True)
+        tangent[blocks] = rate[row, end] / np.maximum(size, _NOWHERE)
     parts = (length > _NOWHERE) | ~np.isin(program.kind, MOVES)  # what joins or separates
     leaving, arriving, is_feed = leaving[parts], arriving[parts], is_feed[parts]
     joint = is_feed[:-1] & is_feed[1:]
@@ -158,19 +144,6 @@ def _corners(program: Program, start: FloatArray, length: FloatArray, is_feed: A
     # atan2 of the half angle's sine and cosine: exact at 0 and at 180 degrees, and lengths cancel
     theta = 2.0 * np.arctan2(np.linalg.norm(after - before, axis=1), np.linalg.norm(after + before, axis=1))
     return {limit: int((np.rad2deg(theta) > limit).sum()) for limit in CORNER_DEGREES}
-
-
-def _set_spline_tangents(program: Program, leaving: FloatArray, arriving: FloatArray) -> None:
-    """Write the unit tangents at both ends of splines into those of the blocks (B, A), in place."""
-    splines = program.splines
-    if not len(splines):
-        return
-    blocks, first = np.unique(splines.block, return_index=True)
-    last = np.append(first[1:], len(splines)) - 1
-    _, rate, _ = at(homogeneous(splines.points, splines.weights), np.array([0.0, 1.0]))
-    for tangent, row, end in ((leaving, first, 0), (arriving, last, 1)):
-        size = np.linalg.norm(rate[row, end], axis=1, keepdims=True)
-        tangent[blocks] = rate[row, end] / np.maximum(size, _NOWHERE)
 
 
 def _count_events(program: Program) -> dict[str, int]:

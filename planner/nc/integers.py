@@ -2,8 +2,7 @@
 them.
 
 X100 is 0.1 mm where the machine's least increment is 0.001 mm, and 0.01 inch under G20, whose increment has
-the same digits one place further on (0.0001 inch). X100. is 100 everywhere. Which of G20 and G21 holds is
-taken from the lines before it in the file.
+the same digits one place further on (0.0001 inch). X100. is 100 everywhere.
 
 P words are dwells beside G4, and of a canned cycle on the line or in force. LinuxCNC and grbl have them in
 seconds. Fanuc and Haas have all of them in milliseconds; written with a point Haas takes seconds. X and U
@@ -95,10 +94,10 @@ class Integers:
             return np.ones(rows)
         switch = words.find("G", 20.0, 21.0)
         inch = np.append(False, words.value[switch] == 20.0)
-        at = np.searchsorted(switch, words.first[1:], side="left")  # switches up to the end of each row
-        in_inches = inch[at]
-        in_inches[words.rows_with(words.find("G", _DWELL))] = False  # a time has no inches
-        return np.where(in_inches, self.increment * INCH_INCREMENT, self.increment)
+        # by switches up to the end of each row
+        inch = inch[np.searchsorted(switch, words.first[1:], side="left")]
+        inch[words.rows_with(words.find("G", _DWELL))] = False  # a time has no inches
+        return np.where(inch, self.increment * INCH_INCREMENT, self.increment)
 
     def applied(self, words: Words) -> Words:
         """The words with their numbers in units."""
@@ -106,9 +105,8 @@ class Integers:
             return words
         row = np.repeat(np.arange(len(words.line)), np.diff(words.first))
         value = words.value.copy()
-        whole = value == np.rint(value)
-        lengths = np.flatnonzero(whole & np.isin(words.letter, list(LENGTHS)))
-        lengths = np.array([w for w in lengths.tolist() if "." not in words.text(w)], dtype=np.int64)
+        whole = np.flatnonzero((value == np.rint(value)) & np.isin(words.letter, list(LENGTHS)))
+        lengths = np.array([w for w in whole.tolist() if "." not in words.text(w)], dtype=np.int64)
         value[lengths] *= self.scale(words)[row[lengths]]
         return dataclasses.replace(words, value=value)
 

@@ -39,46 +39,37 @@ from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 # Nobody cuts at less than 1 mm/min, and few at more than 1 mm per turn [mm/s].
 _FEED_LEAST = 1.0 / SECONDS_PER_MINUTE
 _END_OF_DATA = 11.0  # G code
-_OF_DATA = list(
-    b"NPRLTHDQS"
-)  # letters of data lines behind G10 L50; what has others ends the data without G11
+# Letters of data lines behind G10 L50; what has others ends the data without G11.
+_OF_DATA = list(b"NPRLTHDQS")
 _IF_LATHE = "if this is a lathe's program, write lathe = true under [dialect] of the machine file"
 
 
 class OpenArc(NamedTuple):
-    """An arc that does not close: its line, whether it would `otherwise`, whether I J K are not all 0."""
+    """An arc that does not close."""
 
     line: int
-    otherwise: bool
-    centred: bool
+    otherwise: bool  # with its centre read the other way it would
+    centred: bool  # I J K are not all 0
 
 
 class Interpreter:
     """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`,
-    `faults()`, `notes`.
-
-    Between two chunks `state` and `table` say where the program stands: what parameters of a program
-    ask for.
+    `faults()`, `notes`. Between two chunks `state` and `table` say where the program stands.
     """
 
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
         self.source, self.reading = source, reading
         self.machine = machine
         state = state_of(machine, reading.ignore)
-        self.tool_point = ToolPointSwitch.of(machine)
-        self.ignored = IgnoredWords(
-            reading,
-            state.others,
-            extruder=machine is not None and EXTRUDER in machine.axes,
-            at_tip=self.tool_point.chain is not None,
-        )
+        state.strict, state.absolute_centre = reading.strict, reading.arc_centres == ABSOLUTE
+        self.tool_point = ToolPointSwitch(machine)
+        extruder, at_tip = machine is not None and EXTRUDER in machine.axes, self.tool_point.chain is not None
+        self.ignored = IgnoredWords(reading, state.others, extruder=extruder, at_tip=at_tip)
         table = BlockTable(len(state.letters))
         table.keep_origin(state)
         self.findings = Findings(strict=reading.strict)
         feed_default = None if machine is None else machine.feed_default
         self.mover = Mover(state, table, self.ignored, feed_default, self.findings)
-        self.state.strict = reading.strict
-        self.state.absolute_centre = reading.arc_centres == ABSOLUTE
         self.open_arcs: list[OpenArc] = []  # every arc that does not close
         self._dwells = DwellWords()
         self.limits = LimitsInForce()
@@ -152,29 +143,27 @@ class Interpreter:
         row, rows, self._words = 0, len(words.line), words
         self.table.begin(len(words.letter))
         while row < rows and not self.ended:
-            self.table.make_room(rows - row + 3 * auxiliary.ROWS_AT_ONCE)
-            after = row
+            self.table.make_room(rows - row)
             if not self.mover.splines.open:
                 after = run_plain(words, row, self.state, self.table, self.ignored)
-            self._begun |= after > row
-            if after < rows:
-                self.by_word += 1
-                self.table.frame = int(words.frame[after])
-                if self.state.entering:
-                    letters, values = words.of_rows(after)
-                    ended = ((letters == ord("G")) & (values == _END_OF_DATA)).any()
-                    self.state.entering = not ended and bool(np.isin(letters, _OF_DATA).all())
-                    if ended or self.state.entering:
-                        row = after + 1
-                        continue
-                block = read_block(words, after, self.findings.report, self.ignored)
-                if block is not None and block.ended:
-                    self.ended = self._begun  # the first % starts the program
-                elif block is not None:
-                    self.ended = self._execute_or_report(block)
-                self._begun = True
-                after += 1
-            row = after
+                self._begun, row = self._begun or after > row, after
+            if row == rows:
+                break
+            self.by_word += 1
+            self.table.frame = int(words.frame[row])
+            row += 1
+            if self.state.entering:
+                letters, values = words.of_rows(row - 1)
+                ended = ((letters == ord("G")) & (values == _END_OF_DATA)).any()
+                self.state.entering = not ended and bool(np.isin(letters, _OF_DATA).all())
+                if ended or self.state.entering:
+                    continue
+            block = read_block(words, row - 1, self.findings.report, self.ignored)
+            if block is not None and block.ended:
+                self.ended = self._begun  # the first % starts the program
+            elif block is not None:
+                self.ended = self._execute_or_report(block)
+            self._begun = True
         self.rows_read = row
         self._assume_units()
         self.mover.splines.keep(words)
@@ -194,12 +183,8 @@ class Interpreter:
 
     @property
     def all_arcs_close_otherwise(self) -> bool:
-        """True if there are arcs that do not close, and all of them would with their centres read the other
-        way.
-
-        One line decides nothing, and neither does I0 J0: one odd arc is a mistake, not the way in which a
-        whole program is written.
-        """
+        """True if there are arcs that do not close, and all of them would with their centres read the other way.
+        One line decides nothing, and neither does I0 J0: one odd arc is a mistake."""
         lines = {arc.line for arc in self.open_arcs if arc.centred}
         return len(lines) > 1 and all(arc.otherwise for arc in self.open_arcs)
 
@@ -212,12 +197,12 @@ class Interpreter:
         if self._units_known or self._words is None or not moves.any():
             return
         self._units_known = True
-        line = int(self.table.block.line[moves.argmax()])
+        line, text = int(self.table.block.line[moves.argmax()]), "no G20 or G21 before the first move"
         if begins_in_inches(self.machine):
-            self.findings.note("no G20 or G21 before the first move: inches, as the machine file says", line)
+            self.findings.note(f"{text}: inches, as the machine file says", line)
             return
         row = int((self._words.line == line).argmax())
-        self.findings.assume("no G20 or G21 before the first move: mm", line, int(self._words.first[row]))
+        self.findings.assume(f"{text}: mm", line, int(self._words.first[row]))
 
     def _assume_feeds(self) -> None:
         """Say it if feed moves are so slow that F is most likely one per turn of the spindle."""

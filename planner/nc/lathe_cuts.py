@@ -32,19 +32,17 @@ from planner.nc.turning import PASSES_MAX, SAME, Leg
 class LatheThread:
     """A thread; lengths in mm, x as radii."""
 
-    # start and end: (z, x) where the tool stands, and the root at the thread's end
-    start: complex
-    end: complex
-    height: float  # k, from the crest to the root;  first : d;  least : d_min;  finish : r
-    first: float
+    start: complex  # (z, x) where the tool stands
+    end: complex  # (z, x) of the root at the thread's end
+    height: float  # k, from the crest to the root
+    first: float  # d
     lead: float  # of a turn, along the longer of z and x
-    least: float = 0.0
-    finish: float = 0.0
+    least: float = 0.0  # d_min
+    finish: float = 0.0  # r
     springs: int = 1  # how often the full depth is cut
-    # of the tool [degrees];  taper : i, x at the beginning less x at the end;  chamfer : g
-    angle: float = 0.0
-    taper: float = 0.0
-    chamfer: float = 0.0
+    angle: float = 0.0  # of the tool [degrees]
+    taper: float = 0.0  # i, x at the beginning less x at the end
+    chamfer: float = 0.0  # g
 
 
 def lathe_depths(thread: LatheThread) -> Iterator[float]:
@@ -64,7 +62,7 @@ def thread_passes(thread: LatheThread) -> Iterator[Leg]:
     """The moves of the cycle, from its start and back to it. Raises ValueError."""
     _require(thread)
     start, end = thread.start, thread.end
-    out, ahead = (math.copysign(1.0, start.imag - end.imag), math.copysign(1.0, end.real - start.real))
+    out, ahead = math.copysign(1.0, start.imag - end.imag), math.copysign(1.0, end.real - start.real)
     slope = math.tan(math.radians(thread.angle / 2.0))
     for depth in lathe_depths(thread):
         begin = start.real + ahead * depth * slope
@@ -89,21 +87,14 @@ def _require(thread: LatheThread) -> None:
     along, across = abs(thread.end.real - thread.start.real), abs(thread.end.imag - thread.start.imag)
     first, finish, height = thread.first, thread.finish, thread.height
     depths, angle = "the first depth and the finishing allowance of a thread", thread.angle
+    shape = 0.0 <= angle < 180.0 and 0.0 <= thread.chamfer < along
+    cut = thread.lead > 0.0 and 1 <= thread.springs <= PASSES_MAX
     for right, wrong in (
-        (
-            along > 0.0 and across > 0.0,
-            "a thread needs room in x and z between where the tool stands and X Z",
-        ),
+        (along and across, "a thread needs room in x and z between where the tool stands and X Z"),
         (0.0 < first <= height and 0.0 <= finish < height, f"{depths} lie between 0 and its height"),
         (not finish or first + finish <= height * (1.0 + 1e-12), f"{depths} are more than its height"),
-        (
-            thread.lead > 0.0 and 1 <= thread.springs <= PASSES_MAX,
-            "a thread needs a lead above 0 and at least one pass at its full depth",
-        ),
-        (
-            0.0 <= angle < 180.0 and 0.0 <= thread.chamfer < along,
-            "a thread's angle is 0 to 180 degrees, and its chamfer shorter than the thread",
-        ),
+        (cut, "a thread needs a lead above 0 and at least one pass at its full depth"),
+        (shape, "a thread's angle is 0 to 180 degrees, and its chamfer shorter than the thread"),
         (height <= first * math.sqrt(PASSES_MAX), f"the thread makes more than {PASSES_MAX} passes"),
         (across >= height, "the tool stands below the thread's crest: between X and X plus its height"),
     ):
@@ -115,13 +106,12 @@ def _require(thread: LatheThread) -> None:
 class Pecking:
     """The words of G74, or with x and z exchanged of G75; lengths in mm."""
 
-    # start and end: (z, x) where the tool stands, and the bottom of the last hole or groove
-    start: complex
-    end: complex
+    start: complex  # (z, x) where the tool stands
+    end: complex  # (z, x) of the bottom of the last hole or groove
     peck: float  # q, how much deeper each peck goes; inf for all at once
     shift: float  # p, from one to the next along x; inf for one to the end at once
-    retract: float  # e;  relief : at the bottom, against the shift, at most the way of the shift
-    relief: float = 0.0
+    retract: float  # e
+    relief: float = 0.0  # at the bottom, against the shift, at most the way of the shift
 
 
 def single_cut(start: complex, end: complex, taper: float, pitch: float = 0.0) -> Iterator[Leg]:
@@ -136,8 +126,8 @@ def single_thread(start: complex, end: complex, taper: float, lead: float) -> It
     """The moves of G92 [mm]; `lead` is that along the longer of z and x. Raises ValueError."""
     along = end - complex(start.real, end.imag + taper)
     if not lead > 0.0 or not abs(along.real) > SAME:
-        text = "a thread needs a lead above 0 and room in z between where the tool stands and Z"
-        raise ValueError(f"G92: {text}")
+        room = "room in z between where the tool stands and Z"
+        raise ValueError(f"G92: a thread needs a lead above 0 and {room}")
     return single_cut(start, end, taper, lead * abs(along) / max(abs(along.real), abs(along.imag)))
 
 

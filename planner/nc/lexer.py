@@ -8,10 +8,10 @@ it, :1000 is O1000, $ inside a line is a letter (M3 $1), *71 at the end of a lin
 may have an exponent with its sign: -8.775e-05; E needs two digits or more, since X1E-2 is a coordinate and an
 extruder's word.
 
-A word takes 13 bytes: letter, value and place in the source. What cannot be read becomes a word too, with the
-letter `FAULT` and a code as its value, and the rest of its line is left out. Numbers are rounded as
-float(text): the digits form an integer below 2^53 and the point a power of ten up to 1e22, both exact, and
-one division rounds once. Longer numbers are marked NaN by the compiled loop and read by Python.
+What cannot be read becomes a word too, with the letter `FAULT` and a code as its value, and the rest of its line is
+left out. Numbers are rounded as float(text): the digits form an integer below 2^53 and the point a power of ten up
+to 1e22, both exact, and one division rounds once. Longer numbers are marked NaN by the compiled loop and read by
+Python.
 """
 
 import re
@@ -24,8 +24,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import njit
 
-# The longest source line without its comments [bytes]. RS274NGC stops at 255; a line beyond this is not a
-# program's.
+# bytes of a source line without its comments: RS274NGC stops at 255, a longer one is no program's
 LINE_MAX = 4096
 FAULT = 0
 BOM = b"\xef\xbb\xbf"
@@ -54,7 +53,7 @@ class Unreadable(IntEnum):
 class Words:
     """W words on R rows, source lines with a word; an expanded program has rows of one line many times."""
 
-    # (W,) upper case letter code, b"%"[0], b"$"[0], or `FAULT`; O has the value -1 unless a number follows it
+    # (W,) upper case letter code, b"%"[0], b"$"[0], or `FAULT`; O is -1 unless a number follows it
     letter: Array
     value: FloatArray  # (W,) number, as written (no unit applied)
     at: Array  # (W,) byte offset of the letter in `data`
@@ -129,11 +128,9 @@ def split_words(data: bytes, *, block_delete: bool) -> Words:
         data = data.replace(b"\r", b"\n")  # lines of an old Macintosh; elsewhere a return is a blank
     source = np.frombuffer(data, dtype=np.uint8)
     capacity, lines = _count(source)
-    letter = np.empty(capacity, dtype=np.uint8)
-    value = np.empty(capacity)
+    letter, value = np.empty(capacity, dtype=np.uint8), np.empty(capacity)
     at = np.empty(capacity, dtype=np.int64 if len(data) > np.iinfo(np.int32).max else np.int32)
-    line = np.empty(lines, dtype=np.int32)
-    first = np.empty(lines + 1, dtype=np.int64)
+    line, first = np.empty(lines, dtype=np.int32), np.empty(lines + 1, dtype=np.int64)
     start = len(BOM) if data.startswith(BOM) else 0
     words, rows = _split(source, start, block_delete, letter, value, at, line, first)
     value = value[:words]
@@ -141,14 +138,15 @@ def split_words(data: bytes, *, block_delete: bool) -> Words:
         match = _WORD.match(data, at[word])
         assert match is not None
         value[word] = float(re.sub(rb"[ \t]", b"", match.group()[1:]))
+    frame, first = np.zeros(rows, dtype=np.int32), first[: rows + 1]
     return Words(
         letter=letter[:words],
         value=value,
         at=at[:words],
         line=line[:rows],
-        first=first[: rows + 1],
+        first=first,
         data=data,
-        frame=np.zeros(rows, dtype=np.int32),
+        frame=frame,
     )
 
 

@@ -37,22 +37,14 @@ _BINARY: dict[type, Callable[[Any, Any], Any]] = {
 
 
 class Called(NamedTuple):
-    """A program with its macros written out.
+    """A program with its macros written out."""
 
-    data  : the text
-    line  : (n,) the line of the program that each line of the text comes from, 1-based
-    files : as `Words.files`: where macros begin, with their names, and where the program goes on
-    calls : how often each was run
-    left  : by name why a macro is not run
-    dialect : "klipper", or "apt" of CL files (cl_file.py)
-    """
-
-    data: bytes
-    line: Array
-    files: tuple[tuple[int, str], ...]
-    calls: Counter[str]
-    left: dict[str, str]
-    dialect: str = KLIPPER
+    data: bytes  # the text
+    line: Array  # (n,) the line of the program that each line of the text comes from, 1-based
+    files: tuple[tuple[int, str], ...]  # as `Words.files`: where macros begin, and where the program goes on
+    calls: Counter[str]  # how often each was run
+    left: dict[str, str]  # by name why a macro is not run
+    dialect: str = KLIPPER  # or "apt" of CL files (cl_file.py)
 
 
 class _Unknown(Exception):
@@ -107,8 +99,8 @@ def _lines(text: str, macros: Mapping[str, str], closed: tuple[str, ...], found:
     found.calls[name] += 1
     if found.calls.total() > CALLS_MAX:
         raise InputError(f"{name}: more than {CALLS_MAX:,} calls of macros")
-    inner = (_lines(line, macros, (*closed, name), found) for line in body.split("\n"))
-    return [line for lines in inner for line in lines]
+    closed = (*closed, name)
+    return [line for own in body.split("\n") for line in _lines(own, macros, closed, found)]
 
 
 def _rendered(body: str, params: dict[str, str]) -> str:
@@ -138,11 +130,8 @@ def _rendered(body: str, params: dict[str, str]) -> str:
     return "".join(text)
 
 
-def _value_of(
-    text: str, scope: Mapping[str, Any], checked: Callable[[Any], Any] = lambda value: value
-) -> Any:
-    """The value of an expression: Python's grammar is Jinja's but for filters, which bind as ** does. Raises
-    _Unknown."""
+def _value_of(text: str, scope: Mapping[str, Any], checked: Callable[[Any], Any] = lambda v: v) -> Any:
+    """The value of an expression, in Python's grammar with ** for the | of filters. Raises _Unknown."""
     said = text.strip()[:40]
     try:
         if "**" not in text and len(text) < _TEXT_MAX:
@@ -194,9 +183,10 @@ def _filtered(value: Any, filters: ast.AST, scope: Mapping[str, Any]) -> Any:
             return _value(other, scope) if value is _MISSING else value
         case ast.Call(ast.Name("round"), digits):
             return round(float(_checked(value)), *(_value(one, scope) for one in digits))
-        case ast.Name("float" | "int" as kind):
-            number = float(_checked(value))
-            return number if kind == "float" else int(number)
+        case ast.Name("float"):
+            return float(_checked(value))
+        case ast.Name("int"):
+            return int(float(_checked(value)))
         case ast.Name("upper" | "lower" as kind):
             return str(getattr(str(_checked(value)), kind)())
     raise ValueError(filters)

@@ -16,9 +16,7 @@ from planner.nc.state import NO_MOTION, REFUSED_MOTION, SYSTEMS, State, tool_nam
 
 # Ten times G codes: which switch compensation off, to the left of the path, by a diameter on the line; and
 # which are refused.
-_OFF = 400
-_LEFT = (410, 411)
-_DYNAMIC = (411, 421)
+_OFF, _LEFT, _DYNAMIC = 400, (410, 411), (411, 421)
 _REFUSED_GROUPS = ("plane", "work offset", "tool length", "path control", "retract mode")
 _REFUSED_ONE_SHOTS = (280, 281, 300, 301, 520, 530, 920, 921, 922, 923)  # while it is on
 # G10, G28, G30, G52 and G92, ten times: they use the axis words of their line, so that no motion code may
@@ -33,30 +31,28 @@ _WHY_NO_MOTION = {
 def check_unchanged(state: State, block: Block) -> None:
     """Raise WordFault for words that must not stand in a block while compensation is on."""
     for group in _REFUSED_GROUPS:
-        code = block.g.get(group)
-        if code is not None and not (group == "plane" and code == {2: 170, 1: 180, 0: 190}[state.normal]):
-            raise WordFault(block.at[group], _refusal(f"G{codes.number(code)}"))
-    one_shot = block.g.get("one-shot")
+        code = block.g.get(group, -1)
+        same = code == -1 or (group == "plane" and code == {2: 170, 1: 180, 0: 190}[state.normal])
+        block.require(same, _refusal(f"G{codes.number(code)}"), group)
+    one_shot = block.g.get("one-shot", -1)
     sets_system = one_shot == 100 and block.value.get("L") in (2.0, 20.0)
     number, in_force = round(block.value.get("P", 0.0)), state.system
     of_force = number == 0 or (in_force in SYSTEMS and SYSTEMS.index(in_force) + 1 == number)
     refused = one_shot in _REFUSED_ONE_SHOTS or (sets_system and of_force)
-    if one_shot is not None and refused:
-        raise block.fault(_refusal(f"G{codes.number(one_shot)}"), "one-shot")
+    block.require(not refused, _refusal(f"G{codes.number(one_shot)}"), "one-shot")
     if block.homing:
         raise WordFault(min(block.at.values(), default=0), _refusal("homing"))
-    if "tool change" in block.m:
-        raise block.fault(_refusal("M6"), "tool change")
+    block.require("tool change" not in block.m, _refusal("M6"), "tool change")
 
 
 def check_offsets(state: State, block: Block, *, compensated: bool) -> None:
     """Raise WordFault for a D or H alone that would bring another offset in on Fanuc's controls."""
-    changed = {"cutter compensation", "tool length"} & block.g.keys()
+    if not state.fanuc or {"cutter compensation", "tool length"} & block.g.keys():
+        return
     for letter, code, on in (("H", "G43", bool(state.tool_offset.any())), ("D", "G41 or G42", compensated)):
         number = block.idle.get(letter, block.value.get(letter))
-        before = state.numbers.get(letter)
-        idle = state.fanuc and on and letter not in block.uses and not changed
-        if idle and number is not None and before is not None and number != before:
+        before = state.numbers.get(letter, number)
+        if on and letter not in block.uses and number is not None and number != before:
             text = f"{letter}{number:g} while {letter}{before:g} is in force: the control takes its offset from here on"
             raise block.fault(f"{text}; write {code} beside it", letter)
 
@@ -77,16 +73,13 @@ def switch(
                 state.actual = None
         return None
     name = f"G{codes.number(code)}"
-    word = block.at["cutter compensation"]
-    if on is not None:
-        raise WordFault(word, _refusal(name))
-    if state.normal == 0:
-        raise WordFault(word, f"{name} in the y z plane is not supported; write G17 or G18 before it")
-    if state.normal == 1 and state.rotated:
-        raise WordFault(word, f"{name} in G18 while the work system is rotated is not supported")
-    if "L" in block.value:
-        text = f"the edge orientation L of {name} is not supported; remove it and write the tool's path"
-        raise block.fault(text, "L")
+    block.require(on is None, _refusal(name), "cutter compensation")
+    text = f"{name} in the y z plane is not supported; write G17 or G18 before it"
+    block.require(state.normal != 0, text, "cutter compensation")
+    text = f"{name} in G18 while the work system is rotated is not supported"
+    block.require(state.normal != 1 or not state.rotated, text, "cutter compensation")
+    text = f"the edge orientation L of {name} is not supported; remove it and write the tool's path"
+    block.require("L" not in block.value, text, "L")
     diameter = 0.0 if state.uncompensated else _diameter(state, block, code, findings)
     if diameter == 0.0:
         return None
@@ -98,8 +91,8 @@ def _diameter(state: State, block: Block, code: int, findings: Findings) -> floa
     """[mm]"""
     name = f"G{codes.number(code)}"
     if code in _DYNAMIC:
-        if "D" not in block.value:
-            raise block.fault(f"{name} needs the tool's diameter as a D word", "cutter compensation")
+        text = f"{name} needs the tool's diameter as a D word"
+        block.require("D" in block.value, text, "cutter compensation")
         return block.value["D"] * state.unit
     number = integer(block, "D", 0) if "D" in block.value else state.tool_loaded
     tool = state.tools.get(number)
@@ -134,9 +127,8 @@ def go_to_switches(state: State, table: BlockTable, block: Block, findings: Find
     """Homing ($H, bare G28 of 3-D printers): `block.homing` goes to the position of G28, or machine zero."""
     if not block.homing:
         return
-    home = state.homes.get(280, np.zeros(3))
-    for letter in block.homing:
-        state.position["XYZ".index(letter)] = home["XYZ".index(letter)]
+    axes = ["XYZ".index(letter) for letter in block.homing]
+    state.position[axes] = state.homes.get(280, np.zeros(3))[axes]
     table.add(Kind.RAPID, block.line, state)
     text = "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not"
     findings.assume(text, block.line)
@@ -155,13 +147,7 @@ def _some_axes(state: State, block: Block, home: FloatArray) -> FloatArray:
 
 
 class Mover:
-    """Executes the motion of blocks: moves the state, and appends to the table of blocks.
-
-    feed_default : of moves before the first F word [mm/s], or None
-    findings : keeps what is assumed
-    cutter  : the cutter radius compensation that is on, or None
-    splines : of lines that are read, and of those that are open
-    """
+    """Executes the motion of blocks: moves the state, and appends to the table of blocks."""
 
     def __init__(
         self,
@@ -172,7 +158,8 @@ class Mover:
         findings: Findings,
     ):
         self.state, self.table, self.ignored = state, table, ignored
-        self.feed_default, self.findings = feed_default, findings
+        self.feed_default = feed_default  # of moves before the first F word [mm/s], or None
+        self.findings = findings
         self.cutter: Cutter | None = None
         self.splines = SplineReader()
         self._before_cycles = NO_MOTION  # straight motion code that G80 leaves in force on Fanuc's controls
@@ -191,11 +178,10 @@ class Mover:
         if block.g.get("tool length") in (431, 432) and "motion" not in block.g:
             return  # the axis words are those of G43.1 or G43.2
         if block.g.get("one-shot") == 530:
-            if state.motion not in (0, 1) or not (code is not None or block.has(state.letters)):
-                raise block.fault("G53 goes with G0 or G1 only; write G53 G0 or G53 G1", "one-shot")
-            if not state.absolute:
-                text = "G53 goes with absolute coordinates only; write G90 before it"
-                raise block.fault(text, "one-shot")
+            goes = state.motion in (0, 1) and (code is not None or block.has(state.letters))
+            block.require(goes, "G53 goes with G0 or G1 only; write G53 G0 or G53 G1", "one-shot")
+            text = "G53 goes with absolute coordinates only; write G90 before it"
+            block.require(state.absolute, text, "one-shot")
             offsets.assume_origin(state, "G53", block, self.findings)
         if "H" in block.value and not state.strict and not {"H"} & (block.uses | moves.used_in_force(state)):
             self.ignored.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
@@ -204,13 +190,13 @@ class Mover:
             self._spline(block)
         elif moves.is_move(state, block):
             self._move(block)
-        elif "motion" in block.g and state.motion > 3:
-            raise block.fault(f"G{codes.number(state.motion)} needs an axis word: where it leads", "motion")
+        else:
+            text = f"G{codes.number(max(state.motion, 0))} needs an axis word: where it leads"
+            block.require("motion" not in block.g or state.motion <= 3, text, "motion")
 
     def _move(self, block: Block) -> None:
         state = self.state
-        if state.motion < 0:
-            raise WordFault(block.first_of(state.letters), _WHY_NO_MOTION[state.motion])
+        block.require(state.motion >= 0, _WHY_NO_MOTION.get(state.motion, ""), state.letters)
         auxiliary.take_default(state, self.feed_default, block, self.findings, printer=self.ignored.printer)
         drills = state.motion in codes.CYCLES or (state.fanuc and state.motion == codes.THREADING)
         if not drills:
@@ -219,8 +205,8 @@ class Mover:
             threads.stop(state, self.table, block.line)
         if self.cutter is not None:
             offsets.refuse(state, block, "under cutter radius compensation")
-            if state.motion > 3:  # cycles and threads are not compensated
-                raise block.fault(_refusal(f"G{codes.number(state.motion)}"))
+            # cycles and threads are not compensated
+            block.require(state.motion <= 3, _refusal(f"G{codes.number(state.motion)}"))
         if state.motion > 3:
             offsets.refuse(state, block, "in a cycle or a thread")
         if state.motion in codes.THREADS:
@@ -242,28 +228,27 @@ class Mover:
         state, cutter = self.state, self.cutter
         target = moves.target(state, block)
         kind = (Kind.RAPID, Kind.LINE)[state.motion]
+        surface = kind == Kind.LINE and auxiliary.on_surface(state)
         if kind == Kind.LINE:
             auxiliary.check_feed(state, block)
             if state.feed_mode == "inverse time":
                 auxiliary.feed_of_time(state, block, offsets.length_moved(state, target), self.findings)
-        if kind == Kind.LINE and auxiliary.on_surface(state):
+        if surface:
             offsets.refuse(state, block, "under a constant surface speed")
             radii = state.programmed()[0], float((target - state.position)[0]) + state.programmed()[0]
             state.feed = auxiliary.surface_feed(state, max(map(abs, radii)), block.motion_word())
-            if cutter is None:
-                self._on_surface(block, target, *radii)
-                return
         if cutter is not None:
             cutter.line(target, kind, block.line)
-            return
-        state.position[:], state.actual = target, None
-        self.table.add(kind, block.line, state)
+        elif surface:
+            self._on_surface(block, target, *radii)
+        else:
+            state.position[:], state.actual = target, None
+            self.table.add(kind, block.line, state)
 
     def _on_surface(self, block: Block, target: FloatArray, begin: float, end: float) -> None:
         """A straight move in parts, each with the feed of its larger radius."""
         state, start, at = self.state, self.state.place.copy(), begin
         parts = auxiliary.surface_parts(state, begin, end)
-        self.table.make_room(len(parts))
         for part in parts:
             there = begin + part * (end - begin)
             state.feed = auxiliary.surface_feed(state, max(abs(at), abs(there)), block.motion_word())
@@ -275,8 +260,8 @@ class Mover:
         state = self.state
         target = moves.target(state, block)
         auxiliary.check_feed(state, block)
-        if self.cutter is None and state.actual is not None:
-            raise block.fault("the move after G40 must be straight; write G0 or G1 to where this arc begins")
+        text = "the move after G40 must be straight; write G0 or G1 to where this arc begins"
+        block.require(self.cutter is not None or state.actual is None, text)
         try:
             if not state.plane_known:
                 state.plane_known = True
@@ -305,11 +290,10 @@ class Mover:
         if not is_spline_line(block):
             return
         offsets.refuse(state, block, "on a spline")
-        if self.cutter is not None:
-            raise block.fault("a spline under cutter radius compensation; write G40 before it")
-        if state.actual is not None:
-            text = "the move after G40 must be straight; write G0 or G1 to where this spline begins"
-            raise block.fault(text)
+        text = "a spline under cutter radius compensation; write G40 before it"
+        block.require(self.cutter is None, text)
+        text = "the move after G40 must be straight; write G0 or G1 to where this spline begins"
+        block.require(state.actual is None, text)
         state.series = None
         if state.in_thread:
             threads.stop(state, self.table, block.line)

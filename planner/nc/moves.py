@@ -1,11 +1,9 @@
 """A line of a program, as codes by modal group and words by letter, and where its words lead.
 
-A coordinate is absolute (G90: plus the offsets), relative to the last position (G91) or a machine coordinate
-(G53); a wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes to the absolute place within a turn, forwards
-unless the number has a minus (rs274ngc/interp_find.cc, find_ends and unwrap_rotary). I J K are relative to the
-start (G91.1), or absolute (G90.1). In diameter mode (G7) X words are halved; I, K and R stay radii. An arc in
-G18 or G19 lies in a plane of two axes only if the rotation of the work system is a quarter turn; other angles
-are refused there.
+A wrapped rotary axis (LinuxCNC's WRAPPED_ROTARY) goes to the absolute place within a turn, forwards unless the
+number has a minus (rs274ngc/interp_find.cc, find_ends and unwrap_rotary). I, K and R stay radii in diameter mode
+(G7). An arc in G18 or G19 lies in a plane of two axes only if the rotation of the work system is a quarter turn;
+other angles are refused there.
 """
 
 import math
@@ -43,18 +41,15 @@ class Block:
     """One line of a program."""
 
     line: int  # 1-based source line
-    # g and m: codes in tenths by modal group
-    g: dict[str, int] = field(default_factory=dict)
+    g: dict[str, int] = field(default_factory=dict)  # codes in tenths by modal group
     m: dict[str, int] = field(default_factory=dict)
     value: dict[str, float] = field(default_factory=dict)  # numbers by letter, other than G, M and N
-    # index of the word by letter or modal group, for messages
-    at: dict[str, int] = field(default_factory=dict)
+    at: dict[str, int] = field(default_factory=dict)  # index of the word by letter or modal group
     ended: bool = False  # the line is a "%"
     foreign: bool = False  # a code that is not supported uses the line's words; no move is read from it
     refused_motion: bool = False  # such a code is a motion code and stays in force
     partial: bool = False  # some words were reported and left out; others may have belonged to them
-    # letter and number of words that move nothing and are kept, in their order
-    events: list[tuple[str, float]] = field(default_factory=list)
+    events: list[tuple[str, float]] = field(default_factory=list)  # words that move nothing and are kept
     homing: str = ""  # axes that go to their home position
     stops: bool = False  # one of `events` is a full stop
     settings: list[Setting] = field(default_factory=list)  # commands that set a factor or a limit
@@ -72,13 +67,18 @@ class Block:
 
     def motion_word(self) -> int:
         """Index of the word that makes the block move: motion code, first coordinate, or first word."""
-        if "motion" in self.at:
-            return self.at["motion"]
-        return self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
+        first = self.first_of("XYZIJKR") if self.has("XYZIJKR") else min(self.at.values())
+        return self.at.get("motion", first)
 
     def fault(self, message: str, at: str = "") -> WordFault:
-        """A fault of the word of a letter or modal group, else of the one that makes the block move."""
-        return WordFault(self.at[at] if at else self.motion_word(), message)
+        """A fault of a letter's or group's word, the first of some letters, or the one that makes it move."""
+        word = self.motion_word() if not at else self.at[at] if at in self.at else self.first_of(at)
+        return WordFault(word, message)
+
+    def require(self, good: bool, message: str, at: str = "") -> None:
+        """Raise such a fault unless all is good."""
+        if not good:
+            raise self.fault(message, at)
 
 
 def unused(letter: str) -> str:
@@ -89,11 +89,12 @@ def unused(letter: str) -> str:
 
 
 class ArcFault(WordFault):
-    """The words of an arc contradict each other; `otherwise`: the other of G90.1 and G91.1 would close it."""
+    """The words of an arc contradict each other."""
 
-    def __init__(self, word: int, message: str, *, otherwise: bool):
-        super().__init__(word, message)
-        self.otherwise = otherwise
+    @property
+    def otherwise(self) -> bool:
+        """Whether the other of G90.1 and G91.1 would close it."""
+        return _CLOSES_IF in self.message
 
 
 def take_polar(state: State, block: Block) -> None:
@@ -101,24 +102,23 @@ def take_polar(state: State, block: Block) -> None:
     under G91 both are steps. What is not given stays. Raises WordFault where they mean nothing."""
     if not block.has("@^"):
         return
-    word, (x, y) = block.first_of("@^"), state.programmed()[:2] / state.unit
-    if block.has("XY") or block.g.get("one-shot") not in (None, 40) or state.normal != 2:
-        text = "polar coordinates (@ ^) stand in moves in G17, without X and Y, and not beside G10, G28, G30, G52, G53, G92"
-        raise WordFault(word, text)
-    if not (x or y) and not (state.absolute and "^" in block.value):
-        text = "at the programmed zero the angle of @ and ^ is not known"
-        raise WordFault(word, f"{text}; write G90 and both of them")
-    if not state.absolute and block.value.get("L", 1.0) != 1.0:
-        raise block.fault("polar steps (G91, @ ^) with L are not supported; write the holes out", "L")
+    word, (x, y), steps = block.first_of("@^"), state.programmed()[:2] / state.unit, not state.absolute
+    other = block.has("XY") or block.g.get("one-shot") not in (None, 40) or state.normal != 2
+    text = "polar coordinates (@ ^) stand in moves in G17, without X and Y, and not beside G10, G28, G30, G52, G53, G92"
+    block.require(not other, text, "@^")
+    text = "at the programmed zero the angle of @ and ^ is not known; write G90 and both of them"
+    block.require(bool(x or y) or not (steps or "^" not in block.value), text, "@^")
+    text = "polar steps (G91, @ ^) with L are not supported; write the holes out"
+    block.require(not steps or block.value.get("L", 1.0) == 1.0, text, "L")
     radius, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
-    radius = block.value.pop("@", radius if state.absolute else 0.0) + (0.0 if state.absolute else radius)
-    angle = math.radians(
-        block.value.pop("^", angle if state.absolute else 0.0) + (0.0 if state.absolute else angle)
-    )
-    to = radius * math.cos(angle) * (2.0 if state.diameters else 1.0), radius * math.sin(angle)
-    came = (0.0, 0.0) if state.absolute else (x * (2.0 if state.diameters else 1.0), y)
-    for letter, there, here in zip("XY", to, came, strict=True):
-        block.value[letter], block.at[letter] = there - here, word
+    if steps:
+        radius, angle = block.value.pop("@", 0.0) + radius, block.value.pop("^", 0.0) + angle
+    else:
+        radius, angle = block.value.pop("@", radius), block.value.pop("^", angle)
+    to = radius * np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
+    to = (to - (x, y) if steps else to) * (2.0 if state.diameters else 1.0, 1.0)
+    for letter, length in zip("XY", to.tolist(), strict=True):
+        block.value[letter], block.at[letter] = length, word
 
 
 def is_move(state: State, block: Block) -> bool:
@@ -160,22 +160,17 @@ def target(state: State, block: Block) -> FloatArray:
 
 
 def _unwrapped(state: State, block: Block, axis: int) -> float:
-    """Where the word of a wrapped axis leads [degrees]. Raises WordFault for a place beyond a turn."""
-    value, zero = block.value[state.letters[axis]], float(state.offset[axis])
-    if abs(value) >= _TURN:
-        text = f"axis {state.letters[axis]} is wrapped: its places are above -360 and below 360 degrees"
-        raise WordFault(block.at[state.letters[axis]], text)
-    place = abs(value - zero if block.g.get("one-shot") == 530 else value)
-    return _within_turn(math.copysign(place, value), float(state.position[axis]) - zero) + zero
-
-
-def _within_turn(value: float, here: float) -> float:
-    """The place `value` [degrees] within a turn, ahead of `here` in the direction of its sign."""
-    place = abs(value) + math.floor(here / _TURN) * _TURN
-    forwards = math.copysign(1.0, value) > 0
-    if forwards and place < here:
-        return place + _TURN
-    return place - _TURN if not forwards and place > here else place
+    """Where the word of a wrapped axis leads [degrees], within a turn ahead in the direction of its sign. Raises
+    WordFault for a place beyond a turn."""
+    letter = state.letters[axis]
+    value, zero = block.value[letter], float(state.offset[axis])
+    text = f"axis {letter} is wrapped: its places are above -360 and below 360 degrees"
+    block.require(abs(value) < _TURN, text, letter)
+    here = float(state.position[axis]) - zero
+    place = abs(value - zero if block.g.get("one-shot") == 530 else value) + math.floor(here / _TURN) * _TURN
+    if math.copysign(1.0, value) > 0:
+        return (place + _TURN if place < here else place) + zero
+    return (place - _TURN if place > here else place) + zero
 
 
 def arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
@@ -183,10 +178,10 @@ def arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
     try:
         return _arc(state, block, end)
     except arcs.ArcError as fault:
-        raise ArcFault(block.motion_word(), str(fault), otherwise=_CLOSES_IF in str(fault)) from fault
+        raise ArcFault(block.motion_word(), str(fault)) from fault
 
 
-def plane_of(state: State) -> tuple[int, bool]:
+def _plane(state: State) -> tuple[int, bool]:
     """The normal axis of the plane in the machine's axes, and whether it points against that axis. Raises
     ArcError if the plane is turned to where no axis is normal to it."""
     if not state.rotated or state.normal == 2:
@@ -194,34 +189,34 @@ def plane_of(state: State) -> tuple[int, bool]:
     normal = state.work_system().turn(np.eye(3)[state.normal])
     axis = int(np.abs(normal).argmax())
     if abs(normal[axis]) != 1.0:
-        angle = state.work_system().rotation
-        raise arcs.ArcError(
-            f"an arc in G{17 + 2 - state.normal} while the work system is rotated by {angle:g} degrees is not supported; "
-            "only quarter turns are"
-        )
+        turned = f"while the work system is rotated by {state.work_system().rotation:g} degrees"
+        what = f"an arc in G{17 + 2 - state.normal} {turned} is not supported"
+        raise arcs.ArcError(f"{what}; only quarter turns are")
     return axis, bool(normal[axis] < 0)
 
 
 def _arc(state: State, block: Block, end: FloatArray) -> tuple[arcs.Arc, int]:
-    turned, opposite = plane_of(state)
+    turned, opposite = _plane(state)
     start, normal, unit = state.position, state.normal, state.unit
     a, b = arcs.IN_PLANE[normal]
     plane = f"{arcs.AXES[a]} {arcs.AXES[b]}"
     turns = integer(block, "P", 1) if "P" in block.value else 1
     way = arcs.ArcWay(turned, (state.motion == 2) != opposite, turns, unit)
     axial = block.value.get("IJK"[normal])  # many programs write K0 in G17
+    remedy = ""
     if axial is not None and (axial != 0.0 or state.strict):
-        raise arcs.ArcError(
-            f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane before it"
-        )
+        remedy = f"{'IJK'[normal]} in the {plane} plane; write G17, G18 or G19 for the centre's plane"
+        remedy += " before it"
+    elif "R" in block.value and block.has("IJK"):
+        remedy = "R and I J K on one line both define the centre; write one of them"
+    elif "R" in block.value and not block.has("XYZ"[a] + "XYZ"[b]):
+        remedy = f"an arc with R needs an end point in the {plane} plane"
+    elif not block.has("IJKR"):
+        remedy = f"an arc needs a centre or a radius; write {'IJK'[a]} and {'IJK'[b]}, or R"
+    if remedy:
+        raise arcs.ArcError(remedy)
     if "R" in block.value:
-        if block.has("IJK"):
-            raise arcs.ArcError("R and I J K on one line both define the centre; write one of them")
-        if not block.has("XYZ"[a] + "XYZ"[b]):
-            raise arcs.ArcError(f"an arc with R needs an end point in the {plane} plane")
         return arcs.arc_from_radius(start, end, block.value["R"] * unit, way), turned
-    if not block.has("IJK"):
-        raise arcs.ArcError(f"an arc needs a centre or a radius; write {'IJK'[a]} and {'IJK'[b]}, or R")
     centre = _centre(state, block, absolute=state.absolute_centre)
     try:
         return arcs.arc_from_centre(start, end, centre, way), turned
@@ -278,13 +273,13 @@ def check_words(state: State, block: Block) -> None:
     used = block.uses | used_in_force(state)
     for letter in codes.MOTION_WORDS:
         if letter in block.value and letter not in used:
-            raise WordFault(block.at[letter], unused(letter))
+            raise block.fault(unused(letter), letter)
 
 
 def integer(block: Block, letter: str, least: int) -> int:
     """A word's whole number. Raises WordFault if it is none or less than `least`."""
     value = block.value[letter]
     whole = round(value)
-    if abs(value - whole) > _ROUNDING[letter] or whole < least:
-        raise WordFault(block.at[letter], f"{letter} must be a whole number, {least} or more")
+    good = abs(value - whole) <= _ROUNDING[letter] and whole >= least
+    block.require(good, f"{letter} must be a whole number, {least} or more", letter)
     return whole

@@ -10,9 +10,7 @@ the G92 offset, G10 L20 for the system's origin, G10 L10 for the tool's. G52 giv
 takes coordinates as absolute, whatever G90 and G91 say. Fanuc's and Haas' G10 L20 P gives the origin of G54.1
 P; what would add after G91 is refused: the flat program (language/flat.py) could not say it.
 
-Axes beside x, y and z, rotary A B C in degrees and linear U V W in mm, are joints without rotation of the
-work system and tool offsets. F is the speed of x, y and z together if one of them moves, else of u, v and w,
-else of the rotary axes.
+Axes beside x, y and z are joints without rotation of the work system and tool offsets.
 """
 
 from dataclasses import replace
@@ -22,7 +20,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.faults import Findings
-from planner.nc.moves import Block, WordFault, coordinate, integer
+from planner.nc.moves import Block, coordinate, integer
 from planner.nc.state import (
     FURTHER_MAX,
     FURTHER_SYSTEMS,
@@ -44,11 +42,9 @@ _FIXTURE = 593  # the system of G10 L11
 
 def refuse(state: State, block: Block, where: str) -> None:
     """Raise WordFault for a further axis in a place that does not know them."""
-    if block.has(state.others):
-        word = block.first_of(state.others)
-        letter = next(c for c in state.others if block.at.get(c) == word)
-        text = f"{letter} {where} is not supported; x, y and z are: write {letter} on a line of its own"
-        raise WordFault(word, text)
+    letter = next((c for c in block.at if c in state.others and c in block.value), "")
+    text = f"{letter} {where} is not supported; x, y and z are: write {letter} on a line of its own"
+    block.require(not letter, text, letter)
 
 
 def length_moved(state: State, target: FloatArray) -> float:
@@ -63,36 +59,33 @@ def length_moved(state: State, target: FloatArray) -> float:
 
 def set_tool_offset(state: State, block: Block, findings: Findings) -> None:
     """G43, G43.1, G43.2, G43.4, G49. Raises WordFault for words that contradict each other."""
-    code = block.g["tool length"]
+    code, lengths = block.g["tool length"], block.has("XYZ")
     if code in (431, 432) and "motion" not in block.g:
         refuse(state, block, "of a tool offset")
     if code == 490:
         state.tool_offset = state.zeros()
     elif code == 431:
         state.tool_offset = _given(state, block, state.tool_offset, "XYZ")
-    elif code in (430, 434):
+    elif code in (430, 434) or "H" in block.value:
+        text = "G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines"
+        block.require(code != 432 or not lengths, text, "H")
         tool = integer(block, "H", 0) if "H" in block.value else state.tool_loaded
-        state.tool_offset = _offset_of(state, tool, block, findings)
-    elif "H" in block.value:
-        if block.has("XYZ"):
-            raise block.fault("G43.2 adds a tool (H) or lengths (X Y Z), not both; write two lines", "H")
-        state.tool_offset = state.tool_offset + _offset_of(state, integer(block, "H", 0), block, findings)
-    elif block.has("XYZ"):
-        state.tool_offset = state.tool_offset + _given(state, block, state.zeros(), "XYZ")
+        offset = _offset_of(state, tool, block, findings)
+        state.tool_offset = state.tool_offset + offset if code == 432 else offset
     else:
-        raise block.fault("G43.2 needs a tool as an H word, or lengths as X, Y and Z", "tool length")
+        block.require(lengths, "G43.2 needs a tool as an H word, or lengths as X, Y and Z", "tool length")
+        state.tool_offset = state.tool_offset + _given(state, block, state.zeros(), "XYZ")
 
 
 def take_system(state: State, block: Block, findings: Findings) -> None:
     """G54 to G59.3 and G54.1: the work system from here on. Raises WordFault for G54.1 without a valid P."""
     code = block.g["work offset"]
-    if code >= _OF_HAAS and state.strict:
-        raise block.fault(str(codes.unknown("G", code, strict=True)), "work offset")
+    unknown = str(codes.unknown("G", code, strict=True))
+    block.require(code < _OF_HAAS or not state.strict, unknown, "work offset")
     if code in (541, _G154):
         number = integer(block, "P", 1) if "P" in block.value else 0
-        if not 1 <= number <= FURTHER_MAX:
-            at = "P" if "P" in block.at else "work offset"
-            raise block.fault(f"G{codes.number(code)} needs its work system as P1 to P{FURTHER_MAX}", at)
+        text = f"G{codes.number(code)} needs its work system as P1 to P{FURTHER_MAX}"
+        block.require(1 <= number <= FURTHER_MAX, text, "P" if "P" in block.at else "work offset")
         code = FURTHER_SYSTEMS + number
     elif code >= _OF_HAAS:
         code = FURTHER_SYSTEMS + (code - _OF_HAAS) // 10 + 1
@@ -114,9 +107,9 @@ def shift_origin(state: State, block: Block) -> None:
     it again. Raises WordFault for a G52 or G92 without X, Y and Z."""
     code = block.g["one-shot"]
     if code in (520, 920):
-        if not block.has(state.letters):
-            what = "the coordinates to give to this place" if code == 920 else "the offsets to set"
-            raise block.fault(f"G{codes.number(code)} needs at least one of X, Y and Z: {what}", "one-shot")
+        what = "the coordinates to give to this place" if code == 920 else "the offsets to set"
+        text = f"G{codes.number(code)} needs at least one of X, Y and Z: {what}"
+        block.require(block.has(state.letters), text, "one-shot")
         here = state.in_system()
         for axis in _axes(block, state.letters):
             length = coordinate(state, block, axis)
@@ -151,20 +144,18 @@ def _set_system(state: State, block: Block, kind: int) -> None:
     """G10 L2 and L20 P1 to P9, P0 for the system in force; of Fanuc L2 P1 to P6, and L20 P1 to P300 for G54.1."""
     number = integer(block, "P", 0) if "P" in block.value else -1
     last = len(SYSTEMS) if not state.fanuc else FURTHER_MAX if kind == 20 else _FANUC_SYSTEMS
-    if not (1 if state.fanuc else 0) <= number <= last:
-        needed = f"G10 L{kind} needs its work system as P0 (the one in force) or P1 to P{last}"
-        if state.fanuc:
-            external = "; P0, the external offset, is not read" if number == 0 else ""
-            needed = f"G10 L{kind} of Fanuc needs its work system as P1 to P{last}{external}"
-        raise block.fault(needed, "P" if number >= 0 else "one-shot")
+    needed = f"G10 L{kind} needs its work system as P0 (the one in force) or P1 to P{last}"
+    if state.fanuc:
+        external = "; P0, the external offset, is not read" if number == 0 else ""
+        needed = f"G10 L{kind} of Fanuc needs its work system as P1 to P{last}{external}"
+    block.require((1 if state.fanuc else 0) <= number <= last, needed, "P" if number >= 0 else "one-shot")
     further = state.fanuc and kind == 20
     code = FURTHER_SYSTEMS + number if further else SYSTEMS[number - 1] if number else state.system
     system = state.work_system(code)
     for letter in "IJQ" if kind == 2 and not state.fanuc else "IJQR":
-        if letter in block.value:
-            raise block.fault(f"G10 L{kind} does not use {letter}; remove it", letter)
-    if state.fanuc and not state.absolute:
-        raise block.fault(f"G10 L{kind} of Fanuc adds after G91; write G90 before it", "one-shot")
+        block.require(letter not in block.value, f"G10 L{kind} does not use {letter}; remove it", letter)
+    text = f"G10 L{kind} of Fanuc adds after G91; write G90 before it"
+    block.require(state.absolute or not state.fanuc, text, "one-shot")
     if kind == 2 or state.fanuc:
         system = System(_given(state, block, system.origin), block.value.get("R", system.rotation))
     else:
@@ -175,8 +166,7 @@ def _set_system(state: State, block: Block, kind: int) -> None:
 
 def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None:
     refuse(state, block, "of a tool offset")
-    if "P" not in block.value:
-        raise block.fault(f"G10 L{kind} needs its tool as a P word", "one-shot")
+    block.require("P" in block.value, f"G10 L{kind} needs its tool as a P word", "one-shot")
     number = integer(block, "P", 1)
     tool = state.tools.get(number) or Tool(state.zeros())
     for letter in "IJQ":
@@ -190,8 +180,8 @@ def _set_tool(state: State, block: Block, kind: int, findings: Findings) -> None
 
 def _set_fanuc_tool(state: State, block: Block, kind: int, findings: Findings) -> None:
     """G10 L10 to L13 P R of Fanuc and Haas: a length, its wear, a radius, its wear."""
-    if "P" not in block.value or "R" not in block.value:
-        raise block.fault(f"G10 L{kind} needs its tool as a P word, and a length or radius as R", "one-shot")
+    text = f"G10 L{kind} needs its tool as a P word, and a length or radius as R"
+    block.require("P" in block.value and "R" in block.value, text, "one-shot")
     number, size = integer(block, "P", 1), block.value["R"] * state.unit
     tool = state.tools.get(number) or Tool(state.zeros())
     if kind in (10, 11):
@@ -217,10 +207,11 @@ def _offset_from_place(state: State, block: Block, tool: Tool, kind: int) -> Flo
 
 
 def _offset_of(state: State, number: int, block: Block, findings: Findings) -> FloatArray:
-    if number not in state.tools and number != 0:
+    tool = state.tools.get(number)
+    if tool is None and number != 0:
         text = f"{tool_name(number)} has no length in the machine file: 0"
         findings.assume(text, block.line, block.at["tool length"])
-    return state.tools[number].offset.copy() if number in state.tools else state.zeros()
+    return state.zeros() if tool is None else tool.offset.copy()
 
 
 def _axes(block: Block, letters: str) -> list[int]:

@@ -8,11 +8,10 @@ is not certainly right is left to the interpreter, which says what is wrong.
 """
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import Array
 from planner.base.kernels import njit
 from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
 from planner.nc.block_table import BlockTable
@@ -27,71 +26,26 @@ _F, _G, _N, _O, _S = 70, 71, 78, 79, 83
 _RAPID, _LINE = int(Kind.RAPID), int(Kind.LINE)
 
 
-class _Rows(NamedTuple):
-    """The fields of `Words` that the loop reads."""
-
-    letter: Array
-    value: FloatArray
-    line: Array
-    first: Array
-    frame: Array
-
-
-class _Fixed(NamedTuple):
-    """The fields of `State` that plain rows do not change."""
-
-    absolute: bool
-    unit: float
-    feed_factor: float
-    path_control: int
-    tolerance: float
-    offset: FloatArray  # (A,) in mm and degrees
-    axis: Array  # (256,) index of a letter's axis; -1 for other letters
-    scale: FloatArray  # (A,) mm or degrees per programmed unit
-    turns: Array  # (A,) True for rotary axes
-    wrapped: Array  # (A,) True for wrapped ones, where coordinates are absolute
-
-
-class _Others(NamedTuple):
-    """The fields of `IgnoredWords` that the loop uses; it sets where axes are parked."""
-
-    treatment: Array
-    parked: FloatArray
-
-
-class _Counts(NamedTuple):
-    """State that plain rows change: how far they are read and stored, modal motion and feed."""
-
-    row: int
-    blocks: int
-    events: int
-    refusals: int
-    motion: int
-    feed: float
-    feed_unit: float  # mm per programmed unit when it was given
-
-
 def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: IgnoredWords) -> int:
     """Execute plain rows from `row` on; returns the first row that is not plain."""
     if not state.is_plain:
         return row
-    rows = _Rows(words.letter, words.value, words.line, words.first, words.frame)
+    rows = words.letter, words.value, words.line, words.first, words.frame
     wrapped = np.zeros(len(state.letters), dtype=np.bool_)
     for letter in state.wrapped if state.absolute else "":
         wrapped[state.letters.index(letter)] = True
     path = state.feed_factor, int(state.path_control), state.tolerance, state.offset
-    fixed = _Fixed(state.absolute, state.unit, *path, _axes(state.letters), state.scale, state.turns, wrapped)
-    stored = table.blocks, table.events, table.refusals
-    begin = _Counts(row, *stored, state.motion, state.feed, state.feed_unit)
-    others = _Others(ignored.treatment, ignored.parked)
+    fixed = state.absolute, state.unit, *path, _axes(state.letters), state.scale, state.turns, wrapped
+    events = table.events
+    begin = row, table.blocks, events, table.refusals, state.motion, state.feed, state.feed_unit
+    others = ignored.treatment, ignored.parked
     end = _run(rows, begin, fixed, state.position, table.block, table.event, table.refused_word, others)
-    if end.blocks > begin.blocks:
+    if end[1] > table.blocks:
         state.series = None
-    if end.events > begin.events:
-        state.spindle.speed = float(table.event.value[end.events - 1])  # plain rows have no other events
-    table.blocks, table.events, table.refusals = end.blocks, end.events, end.refusals
-    state.motion, state.feed, state.feed_unit = end.motion, end.feed, end.feed_unit
-    return int(end.row)
+    row, table.blocks, table.events, table.refusals, state.motion, state.feed, state.feed_unit = end
+    if table.events > events:
+        state.spindle.speed = float(table.event.value[table.events - 1])  # plain rows have no other events
+    return int(row)
 
 
 @cache
@@ -104,7 +58,14 @@ def _axes(letters: str) -> Array:
 
 @njit(cache=True)
 def _run(rows, begin, fixed, position, block, event, refused_word, others):  # pragma: no cover
-    """Execute rows from `begin` on into the columns, the position and `refused_word`; says how far."""
+    """Execute rows from `begin` on into the columns, the position and `refused_word`; says how far.
+
+    rows   : the fields of `Words` that the loop reads
+    begin  : state that plain rows change: how far they are read and stored, modal motion and feed
+    fixed  : that they do not; `axis_of` (256,) by letter, `scale` (A,) mm or degrees per programmed unit, `wrapped`
+             (A,) where coordinates are absolute
+    others : of `IgnoredWords`; sets where axes are parked
+    """
     letter, value, line, first, frame = rows
     absolute, unit, feed_factor, path_control, tolerance, offset, axis_of, scale, turns, wrapped = fixed
     treatment, parked = others
@@ -179,4 +140,4 @@ def _run(rows, begin, fixed, position, block, event, refused_word, others):  # p
             block.frame[blocks] = frame[row]
             blocks += 1
         row += 1
-    return _Counts(row, blocks, events, refusals, motion, feed, feed_unit)
+    return row, blocks, events, refusals, motion, feed, feed_unit

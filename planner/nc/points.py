@@ -100,6 +100,7 @@ def in_inches(program: Program, text: bytes) -> bool:
 
 def read_points(data: bytes, source: str) -> Program:
     """The program of a file of points. Raises InputError for anything else."""
+    none = "begins like a file of points, and is none"
     try:
         entries: Any = json.loads(data)
         position = np.asarray(entries["points"], dtype=np.float64)
@@ -110,23 +111,20 @@ def read_points(data: bytes, source: str) -> Program:
         known = entries["format"] == _FORMAT and _are_axes(axes)
         curves = SplineTable(**entries["curves"]) if "curves" in entries else None
     except (ValueError, KeyError, TypeError, RecursionError) as fault:
-        raise InputError(f"begins like a file of points, and is none: {fault!r}", source=source) from None
+        raise InputError(f"{none}: {fault!r}", source=source) from None
     good = known and position.ndim == 2 and position.shape[1] == len(axes) and len(position) > 1
     good = good and feed.shape == (len(position) - 1,) and bool(np.isfinite(position).all())
-    good = good and min(begin, end) >= 0.0 and max(begin, end) < np.inf
-    if not good or not (feed > 0).all() or (tolerance is not None and not 0 < tolerance < np.inf):
-        text = "begins like a file of points, and is none: format points, axes xyz..., points (n+1, A), n feeds above 0 or null"
+    good = good and (feed > 0).all() and min(begin, end) >= 0.0 and max(begin, end) < np.inf
+    if not good or (tolerance is not None and not 0 < tolerance < np.inf):
+        text = f"{none}: format points, axes xyz..., points (n+1, A), n feeds above 0 or null"
         raise InputError(text, source=source)
     program = program_of_points(position, feed, tolerance, source, axes)
-    program = dataclasses.replace(program, speeds=(begin, end))
-    if curves is None:
-        return program
-    if not _join(curves, position):
-        text = "begins like a file of points, and is none: its curves do not begin and end at its points"
-        raise InputError(text, source=source)
     kind = program.kind.copy()
-    kind[curves.block] = Kind.SPLINE
-    return dataclasses.replace(program, kind=kind, splines=curves)
+    if curves is not None:
+        if not _join(curves, position):
+            raise InputError(f"{none}: its curves do not begin and end at its points", source=source)
+        kind[curves.block] = Kind.SPLINE
+    return dataclasses.replace(program, speeds=(begin, end), kind=kind, splines=curves or program.splines)
 
 
 def _join(curves: SplineTable, position: FloatArray) -> bool:

@@ -27,34 +27,27 @@ from planner.nc.unreadable import META
 _COUNTS = (82.0, 83.0)
 _SETS = (104.0, 106.0, 109.0, 140.0, 141.0, 190.0, 191.0, 201.0, 202.0, 203.0, 204.0, 220.0, 221.0)
 _NUMBERS = b"SRXYZE"  # letters of such numbers
-_PATH_MODES = (
-    61.0,
-    61.1,
-    64.0,
-)  # G codes of mills, of which printers have G61 alone: back to what G60 has kept
+# G codes of mills, of which printers have G61 alone: back to what G60 has kept.
+_PATH_MODES = (61.0, 61.1, 64.0)
 _CODE = r"[GMTP]\s*-?\d+(?:\.\d+)?(?![\d.])"
 _NAME = r"@[\w-]+|[A-Za-z]*_\w+(?=\s|$)|[A-Za-z]{2}[A-Za-z\d]*(?=\s+[A-Za-z]\w*\s*=)"
-_COMMAND = re.compile(
-    rf"\s*(?:N\s*\d+\s*)?(?!(?:{META})\b)({_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T)", re.IGNORECASE
-)
+_FIRST = rf"{_CODE}|{_NAME}|[A-Za-z]{{3,}}(?=\s|$)|T"
+_COMMAND = re.compile(rf"\s*(?:N\s*\d+\s*)?(?!(?:{META})\b)({_FIRST})", re.IGNORECASE)
 _EXTENDED = re.compile(rf"\s*(?:{_NAME})", re.IGNORECASE)
 _KEY = re.compile(r"([A-Za-z]\w*)\s*=\s*(\"[^\"]*\"|\S*)")
 _LETTER = re.compile(r"([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+)|)")
 # G codes that are read as in any program, by number; of the others those that level, wipe, park or probe.
 _ANY = frozenset((0, 1, 2, 3, 4, 5, 10, 11, 17, 18, 19, 20, 21, *range(52, 60), 90, 91, 92, 93, 94))
-_LEVELS = frozenset(  # G0 and G1 of RepRapFirmware with H, which end at a switch, among them
-    (0, 1, 12, *range(26, 36), 39, 42, 76, *range(80, 90), 130, 150, 212, 280, 375, 380, 383, 392, 425)
-)
+# G0 and G1 of RepRapFirmware with H, which end at a switch, among them.
+_LEVELS = frozenset((
+    0, 1, 12, *range(26, 36), 39, 42, 76, *range(80, 90), 130, 150, 212, 280, 375, 380, 383, 392, 425,
+))  # fmt: skip
 _BAMBU = 1000  # G2811, G9111 and others from here on, too
 _STOPPING = {"M0": 0, "M1": 10, "M2": 20, "M30": 300}
 _HOMING = ("G28", "G161", "G162")
 # Commands that set coordinates, or keep them (saved_states.py).
-SAVE, RESTORE, OFFSET, PLACE = (
-    "SAVE_GCODE_STATE",
-    "RESTORE_GCODE_STATE",
-    "SET_GCODE_OFFSET",
-    "SET_KINEMATIC_POSITION",
-)
+SAVE, RESTORE = "SAVE_GCODE_STATE", "RESTORE_GCODE_STATE"
+OFFSET, PLACE = "SET_GCODE_OFFSET", "SET_KINEMATIC_POSITION"
 OF_STATE = frozenset((SAVE, RESTORE, OFFSET, PLACE, "G60", "G61"))
 # Names of Klipper by what is said of them, in this order; of others (macros of the machine) settings.MACRO.
 _NAMES = {
@@ -112,13 +105,12 @@ def is_printer(words: Words, *, extruder: bool) -> bool:
         return False
     if extruder and not (len(words.find("G", *_PATH_MODES)) and not len(words.find("G", 60.0))):
         return True
-    of_sets = [words.of_rows(row)[0].tolist() for row in words.rows_with(words.find("M", *_SETS))]
-    sets = (
-        ord("G") not in letters and letters.count(ord("M")) == 1 and set(letters) & set(_NUMBERS)
-        for letters in of_sets
-    )
-    if len(words.find("M", *_COUNTS)) or any(sets):
+    if len(words.find("M", *_COUNTS)):
         return True
+    for row in words.rows_with(words.find("M", *_SETS)):
+        letters = words.of_rows(row)[0].tolist()
+        if ord("G") not in letters and letters.count(ord("M")) == 1 and set(letters) & set(_NUMBERS):
+            return True
     rows = words.rows_with(np.flatnonzero(words.letter == FAULT))
     return any(_EXTENDED.match(words.row_text(row)) for row in rows)
 
@@ -142,9 +134,8 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
     limits = name == settings.VELOCITY_LIMIT or (name == f"M{code}" and code in settings.SETS_LIMITS)
     given = {key: _number(value) for key, value in values.items()}
     if limits or name in OF_STATE:
-        block.settings.append(
-            settings.Setting(name, given, word, values.get("name" if found.extended else "s", ""))
-        )
+        slot = values.get("name" if found.extended else "s", "")
+        block.settings.append(settings.Setting(name, given, word, slot))
     elif name[0] == "G" and code in _ANY and not given.get("h"):
         return False
     elif ignored.ignores(name):

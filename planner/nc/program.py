@@ -1,8 +1,7 @@
 """The record of an NC program: its blocks in arrays, all modal state resolved, in mm, s and rad.
 
 There is one row for each *block that moves or dwells*. A source line can give several blocks (G28 through an
-intermediate point) or none. The data of arcs stand in rows of their own, so that memory grows with what is
-there. Events are arrays too; an `Event` is made when it is looked at (a laser file has 110,000).
+intermediate point) or none.
 """
 
 from __future__ import annotations
@@ -32,8 +31,7 @@ class Kind(IntEnum):
     SPLINE = 5  # along a spline (G5, G5.1, G5.2, G6.2)
 
 
-# Kinds of blocks that move the machine.
-MOVES = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.SPLINE)
+MOVES = (Kind.RAPID, Kind.LINE, Kind.ARC, Kind.SPLINE)  # kinds of blocks that move the machine
 FEED_MOVES = MOVES[1:]  # without rapids
 
 
@@ -77,27 +75,19 @@ class Expansion:
     """Counts of the expansion of a program that computes."""
 
     dialect: str  # "linuxcnc", "fanuc", "heidenhain", "siemens"; "klipper" of macros, "apt"
-    # subprograms in the order of their first call, and how often each was called
-    calls: tuple[tuple[str, int], ...]
+    calls: tuple[tuple[str, int], ...]  # subprograms in the order of their first call, how often each
     turns: int  # turns of loops, jumps and calls
     rows: int  # lines executed, each as often as it was
 
 
 @dataclass(frozen=True, kw_only=True)
 class ToolPoint:
-    """The tool centre point of a program that has it on (nc/tool_point.py): x, y and z are those of the
-    tool's tip.
+    """The tool centre point of a program that has it on (nc/tool_point.py): x, y and z are those of the tool's tip."""
 
-    word       : what switched it on first: "G43.4", "M428", "M128"
-    line       : where
-    length     : of the tool, which z holds [mm]
-    rapids_off : rapid moves while it was off and a rotary axis not at 0: in the program as their paths of the
-                 tip, in chords
-    """
-
-    word: str
-    line: int
-    length: float
+    word: str  # what switched it on first: "G43.4", "M428", "M128"
+    line: int  # where
+    length: float  # of the tool, which z holds [mm]
+    # rapid moves with it off and a rotary axis not at 0: chords of their paths of the tip
     rapids_off: int = 0
 
 
@@ -115,7 +105,7 @@ class SetLimit:
 class Origins:
     """Where programmed zero is, from block to block: K rows, one for each change."""
 
-    # (K,) the first block that it holds for, not decreasing; of several rows of one block the last holds
+    # (K,) the first block that it holds for, not decreasing; of several of one block the last holds
     block: Array
     offset: FloatArray  # (K, 3) its machine position: work offset, G92 and tool length together [mm]
     turned: Array  # (K,) whether the work system is rotated about z, so that adding `offset` is not enough
@@ -137,9 +127,7 @@ class SplineTable:
     """K rational Bezier cubics (nc/bezier.py) over A axes, in the order of the program."""
 
     block: Array  # (K,) block of each, not decreasing: a block has one after the other
-    # (K, 4, A) control points [mm]; the first of a block is where the block before ends, the last is where it
-    # ends itself
-    points: FloatArray
+    points: FloatArray  # (K, 4, A) control points [mm], the first of a block where the block before ends
     weights: FloatArray  # (K, 4) > 0 [-]
 
     def __post_init__(self) -> None:
@@ -165,83 +153,50 @@ def no_splines(axes: int) -> SplineTable:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Program:
-    """An NC program: B blocks over A axes.
+    """An NC program: B blocks over A axes."""
 
-    source       : name of the file, for messages
-    axes         : axis letters, x, y, z first; rotary ones (a, b, c) are in rad here and below
-    start        : (A,) machine position before the first block [mm]
-    kind         : (B,) `Kind`
-    end          : (B, A) machine position at the end of each block [mm]; unchanged for DWELL and STOP
-    feed         : (B,) programmed feed [mm/s]: the speed of x, y and z together, where they stand that of u,
-                   v and w, where those stand too that of the rotary axes [rad/s]; inf for RAPID, DWELL, and
-                   STOP without an extruder
-    dwell        : (B,) standstill [s], > 0 for DWELL only
-    line         : (B,) source line, from 1
-    path_control : (B,) `PathControl` in force at the end of the block
-    tolerance    : (B,) P of G64 [mm]; NaN where the program sets none
-    arc_block    : (K,) block index of each arc, ascending
-    arc_center   : (K, A) centre in the plane; the axial coordinate is that of the start [mm]
-    arc_normal   : (K,) index of the axis normal to the plane of the arc: 2 for G17, 1 for G18, 0 for G19
-    arc_sweep    : (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns
-                   included
-    synchronised : (K,) indices of the blocks that are cut in step with the spindle, at their feed and no
-                   other, ascending
-    splines      : of the blocks of kind SPLINE
-    events       : words without influence on the motion
-    origins      : where programmed zero is in machine coordinates
-    notes        : what a user should know of how it was read; `assumptions` come first
-    assumptions  : what the reader assumed and what may change geometry or time: "line 9: tool 3 has no length
-                   in the machine file: 0 (2 times)"
-    frame        : (B,) the call that each block stands in, an index of `frames`; (0,) where nothing was
-                   expanded
-    frames       : the calls of an expanded program, from parameters, loops and subprograms; () where nothing
-                   was expanded
-    expansion    : what was expanded; None where nothing was
-    extruded     : (B,) what the extruder feeds on each block [mm of filament], back where negative; where it
-                   moves alone, a block of kind STOP with the speed asked for as its feed. (0,) where E is no
-                   axis (nc/extruder.py)
-    limits       : that the program sets and that hold throughout, where they are lower than the machine's
-    reading      : the settings it was read with
-    tool_point   : of a program of the tool's tip; None where x, y and z are those of the joints
-    uncapped     : (B,) `feed` without the feed caps of `reading`, (0,) without such caps (nc/capped.py)
-    speeds       : along the path where it begins and where it ends, as `feed` counts them [mm/s]; 0 for rest
-    pen          : read from a plotter file: M3 and M5 among its events lower and raise the pen
-    text         : what it was read from; None for points and curves of Python
-    """
-
-    source: str
-    axes: tuple[str, ...]
-    start: FloatArray
-    kind: Array
-    end: FloatArray
+    source: str  # name of the file, for messages
+    axes: tuple[str, ...]  # axis letters, x, y, z first; rotary ones (a, b, c) are in rad here and below
+    start: FloatArray  # (A,) machine position before the first block [mm]
+    kind: Array  # (B,) `Kind`
+    end: FloatArray  # (B, A) machine position at the end of each block [mm]; unchanged for DWELL and STOP
+    # (B,) programmed feed [mm/s]: the speed of x, y and z together, where they stand that of u, v and w, where those
+    # stand too that of the rotary axes [rad/s]; inf for RAPID, DWELL, and STOP without an extruder
     feed: FloatArray
-    dwell: FloatArray
-    line: Array
-    path_control: Array
-    tolerance: FloatArray
-    arc_block: Array = field(default_factory=_nothing)
+    dwell: FloatArray  # (B,) standstill [s], > 0 for DWELL only
+    line: Array  # (B,) source line, from 1
+    path_control: Array  # (B,) `PathControl` in force at the end of the block
+    tolerance: FloatArray  # (B,) P of G64 [mm]; NaN where the program sets none
+    arc_block: Array = field(default_factory=_nothing)  # (K,) block index of each arc, ascending
+    # (K, A) centre in the plane; the axial coordinate is that of the start [mm]
     arc_center: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
-    arc_normal: Array = field(default_factory=_nothing)
+    arc_normal: Array = field(default_factory=_nothing)  # (K,) normal axis: 2 for G17, 1 for G18, 0 for G19
+    # (K,) signed angle [rad], positive counter-clockwise about the normal axis, full turns included
     arc_sweep: FloatArray = field(default_factory=_nothing)
+    # blocks in step with the spindle, at their feed only
     synchronised: Array = field(default_factory=_nothing)
-    splines: SplineTable = field(default_factory=lambda: no_splines(0))
-    events: Sequence[Event] = field(default=())
-    origins: Origins = field(
+    splines: SplineTable = field(default_factory=lambda: no_splines(0))  # of the blocks of kind SPLINE
+    events: Sequence[Event] = field(default=())  # words without influence on the motion
+    origins: Origins = field(  # where programmed zero is in machine coordinates
         default_factory=lambda: Origins(block=np.zeros(0), offset=np.zeros((0, 3)), turned=np.zeros(0))
     )
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what a user should know of how it was read; `assumptions` come first
+    # what was assumed and may change geometry or time: "line 9: tool 3 has no length in the machine file: 0 (2 times)"
     assumptions: tuple[str, ...] = ()
-    frame: Array = field(default_factory=_nothing)
-    frames: tuple[Frame, ...] = ()
-    expansion: Expansion | None = None
+    frame: Array = field(default_factory=_nothing)  # (B,) the call of each, an index of `frames`; or (0,)
+    frames: tuple[Frame, ...] = ()  # the calls of an expanded program; () where nothing was expanded
+    expansion: Expansion | None = None  # what was expanded; None where nothing was
+    # (B,) what the extruder feeds on each block [mm of filament], back where negative; where it moves alone, a block of
+    # kind STOP with the speed asked for as its feed. (0,) where E is no axis (nc/extruder.py)
     extruded: FloatArray = field(default_factory=_nothing)
-    limits: tuple[SetLimit, ...] = ()
-    reading: Reading = AS_USUAL
-    tool_point: ToolPoint | None = None
-    uncapped: FloatArray = field(default_factory=_nothing)
+    limits: tuple[SetLimit, ...] = ()  # of the program, which hold throughout where lower than the machine's
+    reading: Reading = AS_USUAL  # the settings it was read with
+    tool_point: ToolPoint | None = None  # of a program of the tip; None where x, y and z are of the joints
+    uncapped: FloatArray = field(default_factory=_nothing)  # (B,) `feed` without feed caps; (0,) without such
+    # along the path where it begins and where it ends, as `feed` counts them [mm/s]; 0 for rest
     speeds: tuple[float, float] = (0.0, 0.0)
-    pen: bool = False
-    text: bytes | None = None
+    pen: bool = False  # read from a plotter file: M3 and M5 among its events lower and raise the pen
+    text: bytes | None = None  # what it was read from; None for points and curves of Python
 
     def __post_init__(self) -> None:
         axes, blocks, arcs = len(self.axes), len(self.kind), len(self.arc_block)
@@ -291,15 +246,26 @@ class Program:
 def renumbered(program: Program, number: Callable[[Array], Array], **columns: Any) -> Program:
     """The program with more blocks: what stands at blocks (n,) of before stands at `number` of them (n,);
     `columns` are its new fields by their names."""
-    splines, origins = program.splines, program.origins
-    return dataclasses.replace(
-        program,
-        arc_block=number(program.arc_block),
-        synchronised=number(program.synchronised),
-        splines=dataclasses.replace(splines, block=number(splines.block)),
-        origins=dataclasses.replace(origins, block=number(origins.block)),
-        **columns,
-    )
+    splines, origins, events = program.splines, program.origins, program.events
+    if isinstance(events, EventTable):
+        events = dataclasses.replace(events, block=number(events.block))
+    fields: dict[str, Any] = {
+        "arc_block": number(program.arc_block),
+        "synchronised": number(program.synchronised),
+        "splines": dataclasses.replace(splines, block=number(splines.block)),
+        "origins": dataclasses.replace(origins, block=number(origins.block)),
+        "events": events,
+    }
+    return dataclasses.replace(program, **(fields | columns))
+
+
+def divided(program: Program, block: Array, **columns: Any) -> Program:
+    """The program with its blocks in parts, `block` (n,) of each; what stands at a block stands at its first part.
+    `columns` are its new fields by their names."""
+    first = np.searchsorted(block, np.arange(len(program) + 1))
+    of_block = ("kind", "feed", "dwell", "line", "tolerance", "path_control", "frame", "extruded")
+    parts = {name: column[block] for name in of_block if len(column := getattr(program, name))}
+    return renumbered(program, lambda blocks: first[blocks], **(parts | columns))
 
 
 class MadeWhenAsked(Sequence[One]):

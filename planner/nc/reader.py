@@ -42,7 +42,6 @@ from planner.nc.reading import (
 from planner.nc.unreadable import refuse_models
 
 _WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program begins, and hardly a file name
-
 _G20, _G70 = 20.0, 70.0
 
 
@@ -75,12 +74,11 @@ def read_program(
         raise InputError(f"{allowed}; found a {type(path).__name__}")
     if isinstance(machine, str | os.PathLike):
         machine = load_machine(machine)
-    if text is not None:
-        data = text.encode() if isinstance(text, str) else text
-        return dataclasses.replace(parse_program(text, machine, reading), text=data)
-    assert path is not None
-    data = load(path)
-    return dataclasses.replace(parse_program(data, machine, reading, source=source_name(path)), text=data)
+    if path is not None:
+        data, source = load(path), source_name(path)
+    else:
+        data, source = text.encode() if isinstance(text, str) else text or b"", "<text>"
+    return dataclasses.replace(parse_program(data, machine, reading, source=source), text=data)
 
 
 def source_name(path: str | Path) -> str:
@@ -141,60 +139,60 @@ def execute(
     tee : gets the expanded rows of a program that computes, chunk by chunk
     """
     interpreter = Interpreter(machine, source, reading)
+    state, findings = interpreter.state, interpreter.findings
     data, left = reading.kept(data, source)
     for line, what in left:
-        interpreter.findings.assume(f"{what} left out, as --ignore says", line)
+        findings.assume(f"{what} left out, as --ignore says", line)
     interpreter.archive = detect.programs_of(data)
-    mains = (one.text() for name, one in interpreter.archive.items() if name.endswith("mpf"))
-    data = next(mains, data)
+    data = next((one.text() for name, one in interpreter.archive.items() if name.endswith("mpf")), data)
     called = rewritten(data, machine, reading, source)
     if called is not None and called.dialect == CL:
         reading = dataclasses.replace(reading, dialect=LINUXCNC)
-    language = detect.language_of(data) if reading.dialect == AUTO else reading.dialect
+    automatic = reading.dialect == AUTO
+    language = detect.language_of(data) if automatic else reading.dialect
     if language == HEIDENHAIN:
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
-        interpreter.state.seconds_meant = interpreter.state.centres_known = True
+        state.seconds_meant = state.centres_known = True
         return interpreter, *expand(interpreter, text_alone(data), HEIDENHAIN, integers_of(machine), tee)
     if language != SIEMENS:
         data, leader = detect.without_leader(data, reading)
         if leader:
-            interpreter.findings.note(f"the text before the first % is not read ({leader!r})", 1)
+            findings.note(f"the text before the first % is not read ({leader!r})", 1)
     words = split_words(data if called is None else called.data, block_delete=reading.block_delete)
     if called is not None:
         words = dataclasses.replace(words, line=called.line[words.line - 1], files=called.files)
     if not len(words.line):
         raise InputError("the program is empty: there is no word in it", source=source, line=1, column=1)
     mark = ""
-    if reading.dialect == AUTO:
+    if automatic:
         mark = "its %_N_" if interpreter.archive else detect.siemens_mark(words, source)
-    language = SIEMENS if mark else language
-    calls = called is not None and called.dialect == KLIPPER
-    prints = calls or language == PRINTER
-    if language != SIEMENS and not reading.strict:
-        extruder = reading.dialect == AUTO and machine is not None and EXTRUDER in machine.axes
+    siemens, first_line = bool(mark) or language == SIEMENS, int(words.line[0])
+    prints = (called is not None and called.dialect == KLIPPER) or language == PRINTER
+    if not siemens and not reading.strict:
+        extruder = automatic and machine is not None and EXTRUDER in machine.axes
         prints |= is_printer(words, extruder=extruder)
     if prints:
         interpreter.ignored.read_printer()
-    if language != SIEMENS and not reading.strict and (units := detect.units(words)):
+    if not siemens and not reading.strict and (units := detect.units(words)):
         text = "G70 and G71 without the words of a cycle are inch and mm, as in ISO 6983 and Mach3"
-        interpreter.findings.assume(text, int(words.line[words.row(units[0])]))
+        findings.assume(text, int(words.line[words.row(units[0])]))
         words.value[units] += _G20 - _G70
-    dialect = SIEMENS if language == SIEMENS else detect.dialect_of(words, reading, prints=prints)
-    if not prints and dialect != SIEMENS and detect.is_turned(words, dialect, reading, machine):
+    dialect = SIEMENS if siemens else detect.dialect_of(words, reading, prints=prints)
+    siemens = dialect == SIEMENS
+    if not prints and not siemens and detect.is_turned(words, dialect, reading, machine):
         dialect = LATHE
-        interpreter.findings.assume(detect.LATHE_NOTE, int(words.line[0]))
-    elif dialect != SIEMENS and not reading.strict:
+        findings.assume(detect.LATHE_NOTE, first_line)
+    elif not siemens and not reading.strict:
         interpreter.two_axes = detect.has_two_axes(words)
-    interpreter.state.fanuc = (
-        reading.dialect == FANUC or dialect in (FANUC, LATHE) or detect.is_fanuc(words, dialect, reading)
-    )
-    interpreter.state.centres_known = dialect == SIEMENS
-    if dialect == SIEMENS and detect.has_two_axes(words) and b"DIAM" not in data.upper():
+    if siemens and detect.has_two_axes(words) and b"DIAM" not in data.upper():
         text = "X is a radius, though nothing moves Y: many lathes begin with DIAMON (diameters)"
-        interpreter.findings.assume(text, int(words.line[0]), grave=True)
-    interpreter.state.plane_known = not interpreter.state.fanuc or dialect == LATHE
-    interpreter.state.seconds_meant = reading.dialect != AUTO or dialect == SIEMENS or interpreter.state.fanuc
+        findings.assume(text, first_line, grave=True)
+    of_fanuc = FANUC in (reading.dialect, dialect) or dialect == LATHE
+    state.fanuc = of_fanuc or detect.is_fanuc(words, dialect, reading)
+    state.centres_known = siemens
+    state.plane_known = not state.fanuc or dialect == LATHE
+    state.seconds_meant = not automatic or siemens or state.fanuc
     integers = integers_of(machine)
     words = integers.applied(words)
     if dialect is not None:
@@ -241,11 +239,11 @@ def _of_called(called: Called, program: Program, faults: Sequence[Fault]) -> tup
         for fault, text in zip(faults, within, strict=True)
     ]
     notes = *program.notes, *(f"the macro {name} is not run: {why}" for name, why in called.left.items())
+    expansion = program.expansion
     if called.calls or called.dialect == CL:
         calls = tuple(called.calls.items())
         expansion = Expansion(dialect=called.dialect, calls=calls, turns=0, rows=len(called.line))
-        program = dataclasses.replace(program, expansion=expansion)
-    return dataclasses.replace(program, notes=notes), faults
+    return dataclasses.replace(program, notes=notes, expansion=expansion), faults
 
 
 def load(path: str | Path) -> bytes:
@@ -270,9 +268,8 @@ def _check_text(data: bytes, source: str) -> None:
     padding = len(data) - len(data.lstrip(b"\0"))  # of tapes, and of transfers in blocks
     nul = data.strip(b"\0").find(b"\0") + padding
     if nul >= padding and data.strip(b"\0"):
-        line = data.count(b"\n", 0, nul) + 1
-        column = nul - data.rfind(b"\n", 0, nul)
         is_utf16 = data[:2] in (b"\xff\xfe", b"\xfe\xff")
         what = "UTF-16 text; save it as UTF-8" if is_utf16 else "a binary file; give a text file"
         text = f"NUL byte found between other characters: this looks like {what}"
+        line, column = data.count(b"\n", 0, nul) + 1, nul - data.rfind(b"\n", 0, nul)
         raise InputError(text, source=source, line=line, column=column)

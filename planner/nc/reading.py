@@ -2,8 +2,7 @@
 say it.
 
 Without settings a reader is lenient where nothing moves and strict where something does: what it does not
-know and what cannot move an axis is counted in a note (planner/nc/faults.py), and what may move is refused
-with its line.
+know and what cannot move an axis is counted in a note (nc/faults.py), and what may move is refused.
 """
 
 from __future__ import annotations
@@ -52,32 +51,24 @@ _SAY = (
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Settings of the reader, kept in `Program.reading`. Raises InputError for a value that is not one of
-    these.
+    """Settings of the reader, kept in `Program.reading`. Raises InputError for values that are none."""
 
-    strict       : refuse everything that would be assumed
-    ignore       : what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands
-                   and words ("$X", "PRINT_START", "ACC"), lines of the file ("12-20"); in one normal form
-    arc_centres  : what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute",
-                   or "auto", which is incremental unless arcs on more than one line close with absolute
-                   centres only, as all of the program do
-    extruder     : what is done with the E words of 3-D printers: "auto" follows them on a machine with an axis
-                   e, and else leaves them out and says so; "refuse" or "ignore"
-    dialect      : whose language parameters, expressions and subprograms are, and the unit of dwells:
-                   "linuxcnc", "fanuc" (Haas too), "heidenhain", "siemens", "printer" (Marlin, Klipper), or
-                   "auto", by what the program holds
-    block_delete : leave out the lines that start with "/"
-    ignore_travel : plan what the travel of the machine's axes does not reach
-    feed_caps    : file of feeds that hold where they are below F, or what was read from one
-    """
-
-    strict: bool = False
+    strict: bool = False  # refuse everything that would be assumed
+    # what the user knows to be harmless: codes ("M428", "G187"), axis letters ("A"), commands and words ("$X",
+    # "PRINT_START", "ACC"), lines of the file ("12-20"); in one normal form
     ignore: tuple[str, ...] = ()
+    # what I J K mean in a program that has neither G90.1 nor G91.1: "incremental", "absolute", or "auto", which is
+    # incremental unless arcs on more than one line close with absolute centres only, as all of the program do
     arc_centres: str = AUTO
+    # what is done with the E words of 3-D printers: "auto" follows them on a machine with an axis e, and else leaves
+    # them out and says so; "refuse" or "ignore"
     extruder: str = AUTO
+    # whose language parameters, expressions and subprograms are, and the unit of dwells: "linuxcnc", "fanuc" (Haas
+    # too), "heidenhain", "siemens", "printer" (Marlin, Klipper), or "auto", by what the program holds
     dialect: str = AUTO
-    block_delete: bool = True
-    ignore_travel: bool = False
+    block_delete: bool = True  # leave out the lines that start with "/"
+    ignore_travel: bool = False  # plan what the travel of the machine's axes does not reach
+    # file of feeds that hold where they are below F, or what was read from one
     feed_caps: FeedCaps | str | Path | None = None
 
     def __post_init__(self) -> None:

@@ -61,8 +61,9 @@ class SavedStates:
             self._restore(setting, back, state, table, line)
         elif name == PLACE:
             here = state.programmed()
-            for axis in _given(given):
-                state.g92[axis] += here[axis] - given[_AXES[axis]]
+            for axis, letter in enumerate(_AXES):
+                if letter in given:
+                    state.g92[axis] += here[axis] - given[letter]
             state.apply_offsets()
         elif name == OFFSET:
             shift = self.shift.copy()
@@ -97,10 +98,6 @@ class SavedStates:
         state.feed, state.feed_unit, state.feed_factor = back.feed, back.feed_unit, back.feed_factor
         if given.get("move"):
             _go(back.position, given.get("move_speed"), state, table, line)
-
-
-def _given(given: dict[str, float]) -> list[int]:
-    return [axis for axis, letter in enumerate(_AXES) if letter in given]
 
 
 def _go(target: FloatArray, speed: float | None, state: State, table: BlockTable, line: int) -> None:

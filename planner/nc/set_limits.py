@@ -54,18 +54,17 @@ class LimitsInForce:
     def take(self, setting: Setting, state: State, table: BlockTable, line: int, findings: Findings) -> None:
         """Execute a command. Raises WordFault for a value that is not positive."""
         self._look(table)
-        if setting.name == VELOCITY_LIMIT and any(map(math.isnan, setting.values.values())):
+        name = setting.name
+        if name == VELOCITY_LIMIT and any(map(math.isnan, setting.values.values())):
             raise WordFault(setting.word, f"{VELOCITY_LIMIT} needs numbers, such as ACCEL=5000")
         given = {key: value for key, value in setting.values.items() if not math.isnan(value)}
         for key, value in given.items():
-            if not (value > 0.0 or (setting.name == VELOCITY_LIMIT and key not in _LIMITING)):
-                text = f"{setting.name} {key.upper()} must be positive, found {value:g}"
-                raise WordFault(setting.word, text)
-        if setting.name == SMOOTHNESS:
+            if not (value > 0.0 or (name == VELOCITY_LIMIT and key not in _LIMITING)):
+                raise WordFault(setting.word, f"{name} {key.upper()} must be positive, found {value:g}")
+        if name == SMOOTHNESS:
             state.tolerance = max(given["e"] * state.unit, TOLERANCE_MIN)
             findings.note("E of G187 is the tolerance of what follows", line)
-            return
-        if setting.name == SPEED_FACTOR:
+        elif name == SPEED_FACTOR:
             given = setting.values
             if "b" in given:
                 self._kept_factor = state.feed_factor
@@ -74,9 +73,9 @@ class LimitsInForce:
             state.feed *= factor / state.feed_factor
             state.feed_factor = factor
             self.factors.append((table.frame, factor))
-            return
-        self._line = self._line or line
-        self._take_limits(setting.name, given, state.unit, line, findings)
+        else:
+            self._line = self._line or line
+            self._take_limits(name, given, state.unit, line, findings)
 
     def throughout(
         self, table: BlockTable, machine: Machine | None, findings: Findings
@@ -96,9 +95,8 @@ class LimitsInForce:
             )
             findings.assume(text, self._line)
         elif limits:
-            findings.note(
-                "limits that the program sets hold where they are lower than the machine's", self._line
-            )
+            text = "limits that the program sets hold where they are lower than the machine's"
+            findings.note(text, self._line)
         if self._along and (machine is None or limited(machine, limits) is not machine):
             text = "an acceleration along the path (M204, ACCEL) limits each axis: a diagonal may have up to 1.7 times as much"
             findings.assume(text, self._along)
@@ -132,22 +130,18 @@ class LimitsInForce:
             if "r" in given:
                 self._set("acceleration", {"e": given["r"]}, unit)
         elif name == VELOCITY_LIMIT:
-            self._take_velocity_limit(given, line, findings)
+            if "accel" in given:
+                self._along = self._along or line
+                self._set("acceleration", dict.fromkeys(EVERY_AXIS, given["accel"]))
+            if "velocity" in given:
+                self._set("velocity", dict.fromkeys(EVERY_AXIS, given["velocity"]))
+                self._set(FEED, {"": given["velocity"]})
+            if rest := sorted(given.keys() - {*_LIMITING}):
+                findings.assume(f"{', '.join(rest).upper()} of {VELOCITY_LIMIT}: {CORNERS}", line)
         else:
             quantity, axis = GRBL[name]
             per = SECONDS_PER_MINUTE if quantity == "velocity" else 1.0
             self._set(quantity, {axis: given[""]}, per=per)
-
-    def _take_velocity_limit(self, given: Mapping[str, float], line: int, findings: Findings) -> None:
-        if "accel" in given:
-            self._along = self._along or line
-            self._set("acceleration", dict.fromkeys(EVERY_AXIS, given["accel"]))
-        if "velocity" in given:
-            self._set("velocity", dict.fromkeys(EVERY_AXIS, given["velocity"]))
-            self._set(FEED, {"": given["velocity"]})
-        rest = sorted(given.keys() - {*_LIMITING})
-        if rest:
-            findings.assume(f"{', '.join(rest).upper()} of {VELOCITY_LIMIT}: {CORNERS}", line)
 
     def _set(self, quantity: str, values: Mapping[str, float], unit: float = 1.0, per: float = 1.0) -> None:
         """Values by axis, in units of so many mm, or degrees, per so many seconds."""

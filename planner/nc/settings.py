@@ -18,8 +18,7 @@ from planner.nc.codes import G_GROUP, M_GROUP, M_REFUSED, Assumption
 AXES = "XYZABCUVW"
 _MOVED = frozenset(AXES + "IJK")
 EVERYTHING = "ABCDEFHIJKLNPQRSTUVWXYZ"
-# Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, and settings of grbl with
-# what they limit.
+# Commands that set a factor of F or limits (set_limits.py): M codes, Klipper's, settings of grbl with what they limit.
 SETS_LIMITS = frozenset((201, 202, 203, 204, 220))
 VELOCITY_LIMIT = "SET_VELOCITY_LIMIT"
 SET_RETRACTION = "SET_RETRACTION"
@@ -101,32 +100,28 @@ ALWAYS_READ = {"G": frozenset(G_GROUP) - _SOMETIMES, "M": frozenset(M_GROUP) - {
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A command that sets something ("M204", "$110"): values by letter or key in small letters; its word; the
-    name of what it keeps."""
+    """A command that sets something ("M204", "$110")."""
 
     name: str
-    values: dict[str, float]
+    values: dict[str, float]  # by letter or key in small letters
     word: int
-    slot: str = ""
+    slot: str = ""  # the name of what it keeps
 
 
 @dataclass(frozen=True, slots=True)
 class CodeSetting:
-    """A code that moves nothing: what is said of it (nothing of one that is read, set_limits.py), the letters
-    behind it on its line that are its own, whether it is a full stop."""
+    """A code that moves nothing."""
 
-    what: Assumption | None
-    letters: str
-    stops: bool = False
+    what: Assumption | None  # what is said of it; None of one that is read, set_limits.py
+    letters: str  # behind it on its line that are its own
+    stops: bool = False  # it is a full stop
 
 
 def setting(letter: str, code: int, before: str, behind: str) -> CodeSetting | None:
     """The setting that a code (in tenths) is beside the letters before it on its line, and those behind it up
     to the next code; None for a code that is read, or refused."""
-    return _g_setting(code, before, behind) if letter == "G" else _m_setting(code, before, behind)
-
-
-def _g_setting(code: int, before: str, behind: str) -> CodeSetting | None:
+    if letter == "M":
+        return _m_setting(code, before, behind)
     if code == 220 and behind:
         return CodeSetting(G_SETTING, EVERYTHING)  # the limits of travel that it checks
     if code == 90:

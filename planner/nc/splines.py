@@ -17,8 +17,7 @@ from planner.nc.moves import Block, WordFault, target
 from planner.nc.state import State
 
 ORDERS = (2, 3, 4)  # of G5.2 and G6.2: degree + 1, at most that of cubic pieces
-# A first control point this near is where the machine stands [mm]: the least digit of metric programs.
-SAME_PLACE = 1e-3
+SAME_PLACE = 1e-3  # a first control point this near is where the machine stands [mm]
 Pieces = tuple[FloatArray, FloatArray]  # (K, 4, 3) control points [mm] and (K, 4) weights
 _CODES = {NURBS: (NURBS, NURBS_END), NURBS_WITH_KNOTS: (NURBS_WITH_KNOTS,)}  # that do not leave a curve
 
@@ -27,8 +26,7 @@ _CODES = {NURBS: (NURBS, NURBS_END), NURBS_WITH_KNOTS: (NURBS_WITH_KNOTS,)}  # t
 class OpenSpline:
     """A curve of several lines, as far as it was read."""
 
-    # line and word: where it begins
-    line: int
+    line: int  # where it begins, as `word`
     word: int
     code: int  # NURBS or NURBS_WITH_KNOTS
     order: int  # degree plus one
@@ -62,8 +60,7 @@ class SplineReader:
 
     def __init__(self) -> None:
         self.open: OpenSpline | None = None
-        # those that hold the word of the open curve, if they were executed before
-        self._words: Words | None = None
+        self._words: Words | None = None  # that hold the word of the open curve, if they were executed before
         self._reflected: tuple[int, FloatArray] | None = None  # blocks after the last G5, and its -(P, Q)
 
     def read(self, state: State, block: Block, blocks: int) -> tuple[Pieces, int] | None:
@@ -101,15 +98,15 @@ class SplineReader:
 
     def _cubic(self, state: State, block: Block, blocks: int) -> Pieces:
         end = _end_in_plane(state, block, "G5")
-        if not ("P" in block.value and "Q" in block.value):
-            raise block.fault("G5 needs P and Q: its second control point, from its end")
+        text = "G5 needs P and Q: its second control point, from its end"
+        block.require("P" in block.value and "Q" in block.value, text)
         near, far = _offset(state, block, "IJ"), _offset(state, block, "PQ")
-        if "I" not in block.value and "J" not in block.value:
+        if not block.has("IJ"):
             if self._reflected is None or self._reflected[0] != blocks:
                 raise block.fault("G5 needs I and J, its first control point from its start, or a G5 before")
             near = self._reflected[1]
-        elif not ("I" in block.value and "J" in block.value):
-            raise block.fault("G5 needs both I and J, or neither")
+        else:
+            block.require("I" in block.value and "J" in block.value, "G5 needs both I and J, or neither")
         self._reflected = blocks + 1, -far
         start = state.position[:3].copy()
         return np.stack([start, start + near, end + far, end])[None], np.ones((1, 4))
@@ -123,21 +120,20 @@ class SplineReader:
             return _even_knots(opened, block), opened.line
         if opened is None:
             if now != NURBS:
-                text = "control points of a spline after its G5.3; write G5.2, or another motion code"
-                raise _fault(block, text)
-            opened = OpenSpline(
-                block.line, block.at["motion"], NURBS, 3, blocks, [state.position[:3].copy()], [1.0]
-            )
-            self.open = opened
-            if "P" in block.value and not block.has("XY"):
+                what = "control points of a spline after its G5.3"
+                raise _fault(block, f"{what}; write G5.2, or another motion code")
+            start = [state.position[:3].copy()]
+            opened = self.open = OpenSpline(block.line, block.at["motion"], NURBS, 3, blocks, start, [1.0])
+            if not block.has("XY"):
                 opened.weights[0] = _weight(block, "P")
-        elif "P" in block.value and not block.has("XY"):
-            raise block.fault("a weight without a control point; write X and Y beside it", "P")
+        else:
+            text = "a weight without a control point; write X and Y beside it"
+            block.require("P" not in block.value or block.has("XY"), text, "P")
         if "L" in block.value:
             opened.order = _order(block, "L")
         if block.has("XYZ"):
-            if not ("X" in block.value and "Y" in block.value):
-                raise WordFault(block.first_of("XYZ"), "a control point of G5.2 needs both X and Y")
+            both = "X" in block.value and "Y" in block.value
+            block.require(both, "a control point of G5.2 needs both X and Y", "XYZ")
             opened.points.append(_end_in_plane(state, block, "G5.2"))
             opened.weights.append(_weight(block, "P"))
         return None
@@ -146,26 +142,26 @@ class SplineReader:
         opened = self.open
         if opened is None:
             if block.g.get("motion") != NURBS_WITH_KNOTS:
-                text = "words of a spline after its last knot; write G6.2, or another motion code"
-                raise _fault(block, text)
+                what = "words of a spline after its last knot"
+                raise _fault(block, f"{what}; write G6.2, or another motion code")
             order = _order(block, "P") if "P" in block.value else 4
             opened = self.open = OpenSpline(block.line, block.at["motion"], NURBS_WITH_KNOTS, order, blocks)
-        elif "P" in block.value:
-            raise block.fault("the order P of a spline stands in its first line", "P")
-        first = not opened.points
-        if first or block.has("XYZ"):
-            if len(opened.knots) > len(opened.points):
-                text = "a control point after a line with a knot only; write it before"
-                raise WordFault(block.first_of("XYZ"), text)
+        else:
+            block.require("P" not in block.value, "the order P of a spline stands in its first line", "P")
+        if not opened.points or block.has("XYZ"):
+            text = "a control point after a line with a knot only; write it before"
+            block.require(len(opened.knots) <= len(opened.points), text, "XYZ")
             opened.points.append(_control_point(state, block, opened))
             opened.weights.append(_weight(block, "R"))
-        elif "R" in block.value:
-            raise block.fault("a weight without a control point; write X, Y or Z beside it", "R")
+        else:
+            text = "a weight without a control point; write X, Y or Z beside it"
+            block.require("R" not in block.value, text, "R")
         if "K" not in block.value:
             raise _fault(block, "a line of G6.2 needs its knot K")
-        if opened.knots and block.value["K"] < opened.knots[-1]:
-            raise block.fault(f"knots must not decrease, as to K{block.value['K']:g} here", "K")
-        opened.knots.append(block.value["K"])
+        knot = block.value["K"]
+        good = not opened.knots or knot >= opened.knots[-1]
+        block.require(good, f"knots must not decrease, as to K{knot:g} here", "K")
+        opened.knots.append(knot)
         if not opened.ended:
             return None
         self.open = None
@@ -180,8 +176,8 @@ def is_spline_line(block: Block) -> bool:
 def _quadratic(state: State, block: Block, blocks: int) -> Pieces:
     end = _end_in_plane(state, block, "G5.1")
     near = _offset(state, block, "IJ")
-    if not ("I" in block.value and "J" in block.value) or not near.any():
-        raise block.fault("G5.1 needs I and J, its control point from its start, not both 0")
+    good = "I" in block.value and "J" in block.value and bool(near.any())
+    block.require(good, "G5.1 needs I and J, its control point from its start, not both 0")
     start = state.position[:3].copy()
     return _split(raised(homogeneous(np.stack([start, start + near, end])[None], np.ones((1, 3)))))
 
@@ -192,15 +188,12 @@ def _split(pieces: FloatArray) -> Pieces:
 
 def _end_in_plane(state: State, block: Block, name: str) -> FloatArray:
     """(3,) where X and Y lead [mm]."""
-    if state.normal != 2:
-        raise block.fault(f"{name} is a curve in the X Y plane; write G17 before it")
-    if "Z" in block.value:
-        raise block.fault(f"{name} is a curve in the X Y plane; Z does not move along it", "Z")
-    if not block.has("XY"):
-        raise block.fault(f"{name} needs an end point; write X and Y")
-    if not state.absolute and name == "G5.2":
-        text = "control points of G5.2 with G91 are relative to what? write G90 before it"
-        raise WordFault(block.first_of("XY"), text)
+    curve = f"{name} is a curve in the X Y plane"
+    block.require(state.normal == 2, f"{curve}; write G17 before it")
+    block.require("Z" not in block.value, f"{curve}; Z does not move along it", "Z")
+    block.require(block.has("XY"), f"{name} needs an end point; write X and Y")
+    text = "control points of G5.2 with G91 are relative to what? write G90 before it"
+    block.require(state.absolute or name != "G5.2", text, "XY")
     return target(state, block)[:3]
 
 
@@ -211,15 +204,14 @@ def _offset(state: State, block: Block, letters: str) -> FloatArray:
 
 def _weight(block: Block, letter: str) -> float:
     weight = block.value.get(letter, 1.0)
-    if not weight > 0.0:
-        raise WordFault(block.at[letter], "a weight must be positive")
+    block.require(weight > 0.0, "a weight must be positive", letter)
     return weight
 
 
 def _order(block: Block, letter: str) -> int:
     order = round(block.value[letter])
-    if order not in ORDERS or abs(order - block.value[letter]) > 1e-3:
-        raise WordFault(block.at[letter], "splines of order 2, 3 and 4 are read (degree 1, 2 and 3)")
+    good = order in ORDERS and abs(order - block.value[letter]) <= 1e-3
+    block.require(good, "splines of order 2, 3 and 4 are read (degree 1, 2 and 3)", letter)
     return order
 
 
@@ -234,11 +226,8 @@ def _control_point(state: State, block: Block, opened: OpenSpline) -> FloatArray
     if opened.points:
         return point
     away = float(np.linalg.norm(point - here[:3]))
-    if away > SAME_PLACE:
-        raise WordFault(
-            block.first_of("XYZ"),
-            f"the first control point of G6.2 is {away:.6g} mm from where the machine stands; move there before it",
-        )
+    text = f"the first control point of G6.2 is {away:.6g} mm from where the machine stands; move there before it"
+    block.require(away <= SAME_PLACE, text, "XYZ")
     return here[:3].copy()
 
 
@@ -247,31 +236,30 @@ def _curve(opened: OpenSpline, knots: FloatArray) -> Pieces:
     return _split(cubic_pieces(control, knots, opened.order - 1))
 
 
-def _check_count(opened: OpenSpline, word: int) -> None:
+def _check_count(opened: OpenSpline, block: Block, at: str) -> None:
     count, order = len(opened.points), opened.order
-    if count < order:
-        text = f"a spline of order {order} needs {order} control points or more; {count} are given"
-        raise WordFault(word, text)
+    text = f"a spline of order {order} needs {order} control points or more; {count} are given"
+    block.require(count >= order, text, at)
 
 
 def _even_knots(opened: OpenSpline, block: Block) -> Pieces:
     """The curve of G5.2: knots 0 (L times), 1, 2 ... n - L, and n - L + 1 (L times) for n points."""
-    _check_count(opened, block.at["motion"])
+    _check_count(opened, block, "motion")
     count, order = len(opened.points), opened.order
     return _curve(opened, np.clip(np.arange(count + order) - order + 1, 0, count - order + 1).astype(float))
 
 
 def _given_knots(opened: OpenSpline, block: Block) -> Pieces:
     """The curve of G6.2, which ends with the knot of this block."""
-    _check_count(opened, block.at["K"])
+    _check_count(opened, block, "K")
     knots, order = np.array(opened.knots), opened.order
-    if knots[order - 1] != knots[0] or knots[-order] != knots[-1] or knots[0] == knots[-1]:
-        raise block.fault(f"first {order} knots of order {order} must be equal, and the last {order}", "K")
+    good = knots[order - 1] == knots[0] != knots[-1] == knots[-order]
+    block.require(good, f"first {order} knots of order {order} must be equal, and the last {order}", "K")
     inner = knots[order:-order]
     times = np.unique(inner, return_counts=True)[1].max(initial=0)
-    if times >= order or inner.min(initial=np.inf) == knots[0]:
-        text = f"a knot inside a spline of order {order} may occur {order - 1} times at most: more break the curve"
-        raise block.fault(text, "K")
-    if inner.max(initial=-np.inf) == knots[-1]:
-        raise block.fault(f"the last {order} knots must be larger than those before: more break it", "K")
+    often = f"a knot inside a spline of order {order} may occur {order - 1} times at most"
+    good = times < order and inner.min(initial=np.inf) != knots[0]
+    block.require(good, f"{often}: more break the curve", "K")
+    good = inner.max(initial=-np.inf) != knots[-1]
+    block.require(good, f"the last {order} knots must be larger than those before: more break it", "K")
     return _curve(opened, knots)

@@ -3,8 +3,8 @@
     machine position = origin of the work system + tool offset + R (programmed coordinate * unit + G92 offset)
 
 R turns about z by the rotation of the work system (G10 L2 R). All lengths are kept in mm, angles of rotary
-axes in degrees, and all positions in machine coordinates, so that changing an offset moves nothing. Positions
-and offsets are those of the A axes that are read: x, y, z and those of `LETTERS` that the machine has.
+axes in degrees, and all positions in machine coordinates, so that changing an offset moves nothing. Vectors are
+over the A axes that are read: x, y, z and those of `LETTERS` that the machine has.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import math
 from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -126,11 +126,10 @@ class State:
     offset: FloatArray = field(default_factory=lambda: np.zeros(3))
     rotated: bool = False  # whether the work system in force is rotated
     system: int = 540
-    # work systems by code (54 is 540, 54.1 P3 is 54103)
-    systems: dict[int, System] = field(default_factory=dict)
+    systems: dict[int, System] = field(default_factory=dict)  # by code (54 is 540, 54.1 P3 is 54103)
     g92: FloatArray = field(default_factory=lambda: np.zeros(3))
     g92_saved: FloatArray = field(default_factory=lambda: np.zeros(3))  # what G92.3 brings back [mm]
-    # (A,) machine positions of G28 (280) and G30 (300) [mm]
+    # (A,) positions of G28 (280) and G30 (300) [mm]
     homes: dict[int, FloatArray] = field(default_factory=dict)
     tools: dict[int, Tool] = field(default_factory=dict)  # by number
     tool_offset: FloatArray = field(default_factory=lambda: np.zeros(3))  # (A,) in force (G43) [mm]
@@ -140,8 +139,7 @@ class State:
     retract_given: bool = False  # a G98 or G99 was read
     numbers: dict[str, float] = field(default_factory=dict)  # of D beside G41, G42, and of H beside G43
     series: CycleSeries | None = None  # canned cycles in force
-    # the last P of a canned cycle [s], which G74 and G84 without P take, as in LinuxCNC
-    cycle_dwell: float = 0.0
+    cycle_dwell: float = 0.0  # the last P of a canned cycle [s], for G74 and G84 without P, as in LinuxCNC
     # (A,) where the tool is instead of at `position`, which cutter radius compensation moves it from; or None
     actual: FloatArray | None = None
     change_timed: bool = False  # how long a tool change takes is known
@@ -181,9 +179,8 @@ class State:
     @property
     def is_plain(self) -> bool:
         """True if straight moves need nothing but offsets, units and F: what the compiled loop knows."""
-        return self.feed_mode == "per minute" and not (
-            self.rotated or self.diameters or self.in_thread or self.actual is not None
-        )
+        further = self.rotated or self.diameters or self.in_thread or self.actual is not None
+        return self.feed_mode == "per minute" and not further
 
     def work_system(self, code: int = 0) -> System:
         """A work system by its code, or the one in force."""
@@ -202,9 +199,7 @@ class State:
 
     def programmed(self) -> FloatArray:
         """(A,) the position in programmed coordinates [mm]."""
-        if not self.rotated:
-            return self.position - self.offset
-        return self.in_system() - self.g92
+        return self.in_system() - self.g92 if self.rotated else self.position - self.offset
 
     def machine(self, point: FloatArray) -> FloatArray:
         """(A,) machine position of `point` (A,) in programmed coordinates [mm]."""
@@ -220,25 +215,21 @@ def state_of(machine: Machine | None, left_out: Container[str] = ()) -> State:
     state = State()
     if machine is not None:
         unit = MM_PER_INCH if begins_in_inches(machine) else 1.0
-        others = (c for c in LETTERS if c.lower() in machine.axes and c not in left_out)
-        letters = "XYZ" + "".join(others)
-        origins = {name: _vector(given, letters) for name, given in machine.work_offsets.items()}
-        tools = {number: _vector({"x": t.x, "z": t.length}, letters) for number, t in machine.tools.items()}
+        letters = "XYZ" + "".join(c for c in LETTERS if c.lower() in machine.axes and c not in left_out)
+        tools = {int(number): ({"x": t.x, "z": t.length}, t.diameter) for number, t in machine.tools.items()}
+        vectors = ("position", "offset", "g92", "g92_saved", "tool_offset")
+        at_zero: dict[str, Any] = {name: np.zeros(len(letters)) for name in vectors}
         state = State(
             letters=letters,
             wrapped="".join(c for c in letters[3:] if machine.axes[c.lower()].wrapped),
             unit=unit,
             feed_unit=unit,
             path_control=PathControl[machine.path_control.upper()],
-            systems={system_code(name): System(origin) for name, origin in origins.items()},
+            systems={system_code(n): System(_vector(at, letters)) for n, at in machine.work_offsets.items()},
             homes={_HOMES[name]: _vector(place, letters) for name, place in machine.positions.items()},
-            tools={int(n): Tool(offset, machine.tools[n].diameter) for n, offset in tools.items()},
+            tools={n: Tool(_vector(size, letters), diameter) for n, (size, diameter) in tools.items()},
             change_timed=machine.times is not None and machine.times.tool_change is not None,
-            position=np.zeros(len(letters)),
-            offset=np.zeros(len(letters)),
-            g92=np.zeros(len(letters)),
-            g92_saved=np.zeros(len(letters)),
-            tool_offset=np.zeros(len(letters)),
+            **at_zero,
         )
     state.apply_offsets()
     return state

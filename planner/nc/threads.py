@@ -20,12 +20,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc import codes, moves
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
-from planner.nc.moves import Block, WordFault, integer
+from planner.nc.moves import Block, integer
 from planner.nc.program import Kind
 from planner.nc.state import State
 from planner.nc.turning import Leg
@@ -46,20 +48,17 @@ _AND_BACK = 331  # G33.1
 class Thread:
     """A thread in programmed coordinates and units, x and depths as radii."""
 
-    # start and end: (x, z) of the drive line and z of its end
-    start: tuple[float, float]
-    end: float
-    # I, from the drive line to the thread's peak;  depth : K;  first : J;  degression : R;  angle : Q
-    # [degrees]
-    peak: float
-    depth: float
-    first: float
+    start: tuple[float, float]  # (x, z) of the drive line
+    end: float  # z of its end
+    peak: float  # I, from the drive line to the thread's peak
+    depth: float  # K
+    first: float  # J
     pitch: float  # P
-    degression: float = 1.0
-    angle: float = 0.0
-    taper: float = 0.0  # E;  tapered : L;  springs : H
-    tapered: int = 0
-    springs: int = 0
+    degression: float = 1.0  # R
+    angle: float = 0.0  # Q [degrees]
+    taper: float = 0.0  # E
+    tapered: int = 0  # L
+    springs: int = 0  # H
 
 
 def depths(thread: Thread) -> Iterator[float]:
@@ -101,18 +100,15 @@ def passes(thread: Thread) -> Iterator[Leg]:
 
 def read_thread(state: State, block: Block, end: float) -> Thread:
     """The thread of a G76 from the present place to z = `end` [mm]. Raises WordFault for its words."""
-    word, value = block.motion_word(), block.value
+    value = block.value
     for letter, what in _NEEDED.items():
-        if letter not in value:
-            raise WordFault(word, f"G76 needs {letter}: {what}")
-    if value["P"] == 0 or value["I"] == 0:
-        letter = "P" if value["P"] == 0 else "I"
-        raise WordFault(block.at[letter], f"{letter} of G76 must not be 0: {_NEEDED[letter]}")
-    if not 0 < value["J"] < value["K"]:
-        text = "J of G76, the depth of the first pass, must be above 0 and below K, the full depth"
-        raise block.fault(text, "J")
-    if not 0 <= value.get("Q", 0.0) <= ANGLE_MAX:
-        raise block.fault(f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees", "Q")
+        block.require(letter in value, f"G76 needs {letter}: {what}")
+    for letter in "PI":
+        block.require(value[letter] != 0, f"{letter} of G76 must not be 0: {_NEEDED[letter]}", letter)
+    text = "J of G76, the depth of the first pass, must be above 0 and below K, the full depth"
+    block.require(0 < value["J"] < value["K"], text, "J")
+    text = f"Q of G76, the compound angle, must be from 0 to {ANGLE_MAX:g} degrees"
+    block.require(0 <= value.get("Q", 0.0) <= ANGLE_MAX, text, "Q")
     here = state.programmed() / state.unit
     part = 0.5 if state.diameters else 1.0
     thread = Thread(
@@ -128,21 +124,19 @@ def read_thread(state: State, block: Block, end: float) -> Thread:
         tapered=integer(block, "L", 0) if "L" in value else 0,
         springs=integer(block, "H", 0) if "H" in value else 0,
     )
-    if thread.tapered > _ENTRY + _END:
-        raise block.fault("L of G76 must be 0 (no taper), 1 (entry), 2 (end) or 3 (both)", "L")
-    if (thread.depth / thread.first) ** thread.degression + thread.springs > PASSES_MAX:
-        raise WordFault(word, f"G76 makes more than {PASSES_MAX} passes; correct J, R or H")
+    text = "L of G76 must be 0 (no taper), 1 (entry), 2 (end) or 3 (both)"
+    block.require(thread.tapered <= _ENTRY + _END, text, "L")
+    count = (thread.depth / thread.first) ** thread.degression + thread.springs
+    block.require(count <= PASSES_MAX, f"G76 makes more than {PASSES_MAX} passes; correct J, R or H")
     return thread
 
 
 def thread(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
     """G33, or G33.1 with its way back. Raises WordFault for words that are missing or impossible."""
     name = f"G{codes.number(state.motion)}"
-    if block.value.get("K", 0.0) == 0.0:
-        raise block.fault(f"{name} needs its pitch as a K word, on each line")
+    block.require(block.value.get("K", 0.0) != 0.0, f"{name} needs its pitch as a K word, on each line")
     faster = block.value.get("I", 1.0)
-    if not faster > 0:
-        raise block.fault("I of G33.1, how much faster the way back is, must be above 0", "I")
+    block.require(faster > 0, "I of G33.1, how much faster the way back is, must be above 0", "I")
     feed = _feed(state, block, abs(block.value["K"]))
     target, start = moves.target(state, block), state.position.copy()
     _cut(state, table, block.line, target, feed)
@@ -163,8 +157,7 @@ def cut_thread(state: State, table: BlockTable, block: Block, findings: Findings
     feed = _feed(state, block, 1.0)
     for cut in passes(read):
         here[[0, 2]] = cut.end.imag * state.unit, cut.end.real * state.unit
-        place = state.position.copy()
-        place[:3] = state.machine(here)[:3]
+        place = np.append(state.machine(here)[:3], state.position[3:])
         if cut.pitch:
             _cut(state, table, block.line, place, cut.pitch * feed)
         else:
@@ -175,7 +168,6 @@ def cut_thread(state: State, table: BlockTable, block: Block, findings: Findings
 
 def stop(state: State, table: BlockTable, line: int) -> None:
     """A full stop before or after a cut."""
-    table.make_room(1)
     table.add(Kind.STOP, line, state)
     state.in_thread = False
 
@@ -185,7 +177,6 @@ def _cut(state: State, table: BlockTable, line: int, target: FloatArray, feed: f
         stop(state, table, line)
     programmed, state.feed = state.feed, feed
     state.position[:], state.actual = target, None
-    table.make_room(1)
     table.synchronised.append(table.blocks)
     table.add(Kind.LINE, line, state)
     state.feed, state.in_thread = programmed, True
@@ -196,7 +187,6 @@ def _rapid(state: State, table: BlockTable, line: int, place: FloatArray) -> Non
         stop(state, table, line)
     if (place != state.place).any():
         state.position[:], state.actual = place, None
-        table.make_room(1)
         table.add(Kind.RAPID, line, state)
 
 
@@ -208,9 +198,8 @@ def _say(state: State, block: Block, findings: Findings) -> None:
 def _feed(state: State, block: Block, pitch: float) -> float:
     """Feed [mm/s] of programmed units in a turn. Raises WordFault if the spindle's speed is not known."""
     name, spindle = f"G{codes.number(state.motion)}", state.spindle
-    if spindle.surface_speed:
-        text = f"{name} under a constant surface speed (G96) has no feed that is known; write G97 and S"
-        raise block.fault(text)
-    if not spindle.turning or not spindle.speed > 0:
-        raise block.fault(f"{name} needs the spindle turning; write S and M3 or M4 before it")
+    text = f"{name} under a constant surface speed (G96) has no feed that is known; write G97 and S"
+    block.require(not spindle.surface_speed, text)
+    turns = bool(spindle.turning) and spindle.speed > 0
+    block.require(turns, f"{name} needs the spindle turning; write S and M3 or M4 before it")
     return pitch * state.unit * spindle.speed / SECONDS_PER_MINUTE

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,21 +24,12 @@ from planner.machine import Machine
 from planner.machine.kinematics.chain import LINEAR, Chain, kinematics_of
 from planner.nc.block_table import BlockTable
 from planner.nc.moves import Block
-from planner.nc.program import (
-    FEED_MOVES,
-    MOVES,
-    EventTable,
-    Kind,
-    PathControl,
-    Program,
-    ToolPoint,
-    renumbered,
-)
+from planner.nc.program import FEED_MOVES, MOVES, Kind, PathControl, Program, ToolPoint, divided
 from planner.nc.settings import TOOL_POINT_ON
 from planner.nc.state import LETTERS, State
 
 CHORD_SHARE = 0.1  # of the tolerance, that a rapid move of the joints leaves its chords by [-]
-CHORDS_MAX = 2**14  # of one move: enough for a turn at 1e4 mm from the axis and a tolerance of 1 um
+CHORDS = 2 ** np.arange(15)  # of one move: enough for a turn at 1e4 mm from the axis and a tolerance of 1 um
 G43_4, CANCELLED = 434, (430, 431, 432, 490)  # tool length codes, ten times; the others switch G43.4 off
 _JOINT_PLACES = {280: "G28", 300: "G30", 530: "G53"}  # one-shots whose coordinates are those of the joints
 
@@ -53,17 +43,12 @@ class Switch(NamedTuple):
     length: float
 
 
-@dataclass
 class ToolPointSwitch:
     """Follows the switch through a program; does nothing on machines without kinematics."""
 
-    chain: Chain | None  # kinematics of the machine, or None
-    switches: list[Switch] = dataclasses.field(default_factory=list)  # so far
-
-    @classmethod
-    def of(cls, machine: Machine | None) -> ToolPointSwitch:
-        """The switch of a machine, with its kinematics if it has any."""
-        return cls(kinematics_of(machine) if machine is not None and machine.kinematics else None)
+    def __init__(self, machine: Machine | None) -> None:
+        self.chain = kinematics_of(machine) if machine is not None and machine.kinematics else None
+        self.switches: list[Switch] = []  # so far
 
     def take(self, state: State, table: BlockTable, block: Block) -> None:
         """Follow the words of a block. Raises WordFault without kinematics, and for a tool off its axis."""
@@ -71,7 +56,13 @@ class ToolPointSwitch:
         if tool == G43_4 and self.chain is None:
             needs = "the tool centre point (G43.4) needs a machine with a table [kinematics]"
             raise block.fault(f"{needs}; add it to the machine file", "tool length")
-        now = self._word(block, tool)
+        now = self.on
+        if tool == G43_4:
+            now = "G43.4"
+        elif tool in CANCELLED and now == "G43.4":
+            now = ""
+        if block.tool_point is not None:
+            now = f"M{block.tool_point}" if block.tool_point in TOOL_POINT_ON else ""
         if self.chain is None or (now == self.on and tool is None):
             return
         length = float(state.tool_offset[2]) or self.chain.data.tool_length
@@ -88,27 +79,14 @@ class ToolPointSwitch:
         code = block.g.get("one-shot", 0)
         turned = before[state.turns].any() or state.position[state.turns].any()
         if self.on and code in _JOINT_PLACES and turned:
-            raise block.fault(
-                f"the tool centre point is on ({self.on}) and a rotary axis is not at 0, and {_JOINT_PLACES[code]} goes to a "
-                "place of the joints; switch the tool centre point off before it (G49, M429, M129)",
-                "one-shot",
-            )
+            text = f"the tool centre point is on ({self.on}) and a rotary axis is not at 0, and {_JOINT_PLACES[code]}"
+            remedy = "switch the tool centre point off before it (G49, M429, M129)"
+            raise block.fault(f"{text} goes to a place of the joints; {remedy}", "one-shot")
 
     @property
     def on(self) -> str:
         """The word that has it on; empty where it is off."""
         return self.switches[-1].word if self.switches else ""
-
-    def _word(self, block: Block, tool: int | None) -> str:
-        """The word that has it on after the words of a block; empty where it is off."""
-        now = self.on
-        if tool == G43_4:
-            now = "G43.4"
-        elif tool in CANCELLED and now == "G43.4":
-            now = ""
-        if block.tool_point is not None:
-            now = f"M{block.tool_point}" if block.tool_point in TOOL_POINT_ON else ""
-        return now
 
     def _move(self, state: State, now: str, length: float) -> None:
         """The coordinates of the place where the joints stand, on the other side of the switch."""
@@ -136,7 +114,7 @@ def at_the_tip(program: Program, switch: ToolPointSwitch, machine: Machine | Non
         return program
     first = _tool_of(program, switch.switches)
     whole = _with_axes(program, switch.chain.axes)
-    made = _Pieces(whole, on, tilted, switch.chain.with_tool(first.length), machine).program()
+    made = _in_pieces(whole, ~on & tilted, switch.chain.with_tool(first.length), machine.tolerance)
     off = int((~on & tilted & (program.kind == Kind.RAPID)).sum())
     text = f"line {first.line}: the tool centre point is on ({first.word}), x, y, z are of the tip of a tool of {first.length:g} mm"
     if off:
@@ -150,26 +128,21 @@ def _tilted(program: Program, chain: Chain | None) -> Array:
     rotary = chain.data.rotary if chain is not None else ()
     columns = [k for k, letter in enumerate(program.axes) if letter in rotary]
     turned: Array = np.any(np.vstack([program.start, program.end])[:, columns], axis=1)
-    found: Array = turned[1:] | turned[:-1]
-    return found
+    return np.logical_or(turned[1:], turned[:-1])
 
 
 def _tool_of(program: Program, switches: list[Switch]) -> Switch:
     """The switch that moves are made under. Raises InputError if there are two lengths of tools."""
     ends = [*(s.block for s in switches[1:]), len(program)]
-    used = [
-        s
-        for s, end in zip(switches, ends, strict=True)
-        if s.word and np.isin(program.kind[s.block : end], MOVES).any()
-    ]
+    of_moves = np.isin(program.kind, MOVES)
+    used = [s for s, end in zip(switches, ends, strict=True) if s.word and of_moves[s.block : end].any()]
     for switch in used:
         if switch.length != used[0].length:
-            raise InputError(
+            text = (
                 f"the tool centre point is on with a tool of {switch.length:g} mm, and from line {used[0].line} on with one of "
-                f"{used[0].length:g} mm; one length is planned at a time: plan the part of each tool as a program of its own",
-                source=program.source,
-                line=switch.line,
+                f"{used[0].length:g} mm; one length is planned at a time: plan the part of each tool as a program of its own"
             )
+            raise InputError(text, source=program.source, line=switch.line)
     return used[0]
 
 
@@ -194,68 +167,41 @@ def _with_axes(program: Program, axes: tuple[str, ...]) -> Program:
     )
 
 
-class _Pieces:
-    """The blocks of a program as pieces whose ends are places of p."""
-
-    def __init__(self, program: Program, on: Array, tilted: Array, chain: Chain, machine: Machine):
-        self.whole, self.chain = program, chain
-        self.off = ~on & tilted
-        feed = np.flatnonzero(self.off & np.isin(program.kind, FEED_MOVES))
-        if len(feed):
-            raise InputError(
-                "a feed move with the tool centre point off while a rotary axis is off 0: there only rapid moves (G0) are planned with "
-                f"it off ({len(feed):,} such moves); switch the tool centre point on before it (G43.4, M428, M128, TRAORI), or turn "
-                "the rotary axes to 0",
-                source=program.source,
-                line=int(program.line[feed[0]]),
-            )
-        given = program.tolerance[np.isfinite(program.tolerance)]
-        self.within = CHORD_SHARE * min(machine.tolerance, float(given.min(initial=np.inf)))
-        self.end = program.end.copy()
-        self.end[self.off] = self._of(chain.point, program.end[self.off])
-
-    def _of(self, function: Callable[[dict[str, Any]], dict[str, Any]], places: FloatArray) -> FloatArray:
-        axes = self.whole.axes
-        found = places.copy()
-        new = function({letter: places[:, k] for k, letter in enumerate(axes)})
-        for letter in LINEAR:
-            found[:, axes.index(letter)] = new[letter]
-        return found
-
-    def program(self) -> Program:
-        """The program with these ends, its rapid moves of the joints in chords."""
-        whole = self.whole
-        rapids = np.flatnonzero(self.off & (whole.kind == Kind.RAPID)).tolist()
-        if not rapids:
-            return dataclasses.replace(whole, end=self.end)
-        ends = [self.end[k : k + 1] for k in range(len(whole))]
-        for k in rapids:
-            begin = self.end[k - 1] if k else whole.start
-            ends[k] = self._chords(self._of(self.chain.joints, begin[None])[0], whole.end[k])
-        count = np.array([len(pieces) for pieces in ends])
-        first = np.append(0, np.cumsum(count))
-        block = np.repeat(np.arange(len(whole)), count)
-        inner = np.ones(len(block), dtype=bool)
-        inner[first[1:] - 1] = False
-        events = whole.events
-        assert isinstance(events, EventTable)
-        return renumbered(
-            whole,
-            lambda blocks: first[blocks],
-            end=np.concatenate(ends),
-            **{name: getattr(whole, name)[block] for name in ("kind", "feed", "dwell", "line", "tolerance")},
-            path_control=np.where(inner, PathControl.BLEND, whole.path_control[block]),
-            events=dataclasses.replace(events, block=first[events.block]),
-            frame=whole.frame[block] if len(whole.frame) else whole.frame,
+def _in_pieces(program: Program, off: Array, chain: Chain, tolerance: float) -> Program:
+    """The program with ends in p, its rapid moves of the joints, among the blocks `off` (B,), in chords."""
+    if not off.any():
+        return program
+    feed = np.flatnonzero(off & np.isin(program.kind, FEED_MOVES))
+    if len(feed):
+        text = (
+            "a feed move with the tool centre point off while a rotary axis is off 0: there only rapid moves (G0) are planned with "
+            f"it off ({len(feed):,} such moves); switch the tool centre point on before it (G43.4, M428, M128, TRAORI), or turn "
+            "the rotary axes to 0"
         )
-
-    def _chords(self, begin: FloatArray, end: FloatArray) -> FloatArray:
-        """(n, A) ends in p of chords of a straight line of the joints, left by at most `within`."""
-        count = 1
-        while True:
+        raise InputError(text, source=program.source, line=int(program.line[feed[0]]))
+    given = program.tolerance[np.isfinite(program.tolerance)]
+    within = CHORD_SHARE * min(tolerance, float(given.min(initial=np.inf)))
+    end = program.end.copy()
+    end[off] = _of(chain.point, program.axes, program.end[off])
+    ends = [end[k : k + 1] for k in range(len(program))]
+    for k in np.flatnonzero(off & (program.kind == Kind.RAPID)).tolist():
+        begin = _of(chain.joints, program.axes, (end[k - 1] if k else program.start)[None])
+        for count in CHORDS.tolist():  # a straight line of the joints
             share = np.linspace(0.0, 1.0, 2 * count + 1)[:, None]
-            places = self._of(self.chain.point, begin + share * (end - begin))
+            places = _of(chain.point, program.axes, begin + share * (program.end[k] - begin))
             bow = places[1::2] - 0.5 * (places[:-1:2] + places[2::2])
-            if count >= CHORDS_MAX or float(np.linalg.norm(bow, axis=1).max()) <= self.within:
-                return places[2::2]
-            count *= 2
+            if float(np.linalg.norm(bow, axis=1).max()) <= within:
+                break
+        ends[k] = places[2::2]
+    block = np.repeat(np.arange(len(program)), [len(pieces) for pieces in ends])
+    inner = np.append(block[1:] == block[:-1], False)
+    control = np.where(inner, PathControl.BLEND, program.path_control[block])
+    return divided(program, block, end=np.concatenate(ends), path_control=control)
+
+
+def _of(function: Callable[[dict[str, Any]], Any], axes: tuple[str, ...], places: FloatArray) -> FloatArray:
+    """(n, A) places of the joints or of p from those (n, A) of the other."""
+    found, new = places.copy(), function({letter: places[:, k] for k, letter in enumerate(axes)})
+    for letter in LINEAR:
+        found[:, axes.index(letter)] = new[letter]
+    return found

@@ -76,8 +76,7 @@ def pattern_repeat(contour: Contour, passes: int, shift: complex, allowance: com
 
 
 def stock_removal(contour: Contour, given: Roughing) -> Iterator[Leg]:
-    """The moves of G71, whose levels are imaginary parts; those of G72 with x and z exchanged. Raises
-    ValueError."""
+    """The moves of G71, with imaginary levels; of G72 with x and z exchanged. Raises ValueError."""
     count = max((k + 1 for k, leg in enumerate(contour.legs) if k and not leg.fast), default=0)
     if count < 2:
         raise ValueError("the profile has no move at its feed behind its first one")
@@ -102,18 +101,14 @@ def has_pocket(contour: Contour) -> bool:
 
 
 class _Removal:
-    """The passes of G71 above a profile along which z does not turn back.
-
-    top   : C, A moved by the allowance
-    whole : the first and the last z of a pass that nothing stops
-    at    : where the tool is
-    """
+    """The passes of G71 above a profile along which z does not turn back."""
 
     def __init__(self, contour: Contour, given: Roughing):
         moved = [leg.moved(given.allowance + given.more) for leg in contour.legs]
         self.given, self.fast = given, contour.fast
+        # `top`: C, A moved by the allowance
         self.first, self.top = moved[0].end, contour.start + given.allowance
-        self.at, self.pieces = self.top, list(_monotone(moved))
+        self.at, self.pieces = self.top, list(_monotone(moved))  # `at`: where the tool is
         ends = [self.first, *(leg.end for _, leg in self.pieces)]
         height = self.top.imag - self.first.imag
         if abs(height) <= SAME:
@@ -122,14 +117,12 @@ class _Removal:
         self.lowest = min(self.out * end.imag for end in ends)
         self.ahead = math.copysign(1.0, ends[-1].real - self.first.real)
         if any((leg.end - start).real * self.ahead < -SAME for start, leg in self.pieces):
-            raise ValueError(
-                "z turns back along the profile of G71, or x along that of G72: which passes a control makes is not "
-                "known; write these passes out"
-            )
+            turns = "z turns back along the profile of G71, or x along that of G72"
+            raise ValueError(f"{turns}: which passes a control makes is not known; write these passes out")
         depths = (self.out * self.top.imag - self.lowest) / given.depth if given.depth > 0 else math.inf
         if depths > PASSES_MAX:
             raise ValueError(f"the depth of a pass must be above 0 and lead to at most {PASSES_MAX} passes")
-        self.whole = self.top.real, ends[-1].real
+        self.whole = self.top.real, ends[-1].real  # the first and the last z of a pass that nothing stops
 
     def _level(self, n: int) -> float:
         return self.top.imag - self.out * n * self.given.depth
@@ -139,8 +132,7 @@ class _Removal:
         yield Leg(end, fast=fast)
 
     def below(self, n: int, span: tuple[float, float]) -> Iterator[Leg]:
-        """The passes from the level n on that lie below a pass of the level before, a pocket to its ground
-        before the next one."""
+        """The passes from level n on below one of the level before, a pocket to its ground before the next."""
         level = self._level(n)
         if self.out * level - self.lowest <= SAME:
             return
@@ -177,9 +169,8 @@ class _Removal:
             low, high = (self.out * (point.imag - level) for point in (start, leg.end))
             if begin is None and high < -SAME:
                 begin = _crossing(start, leg, level)
-                down = self._wall(
-                    [*walls, (start, replace(leg, end=complex(begin, level)))], self._level(n - 1)
-                )
+                way = [*walls, (start, replace(leg, end=complex(begin, level)))]
+                down = self._wall(way, self._level(n - 1))
             elif begin is not None and high >= -SAME:
                 yield begin, _crossing(start, leg, level), down
                 begin = None
@@ -193,12 +184,12 @@ class _Removal:
         start, leg = inside[0]
         if self.out * (start.imag - above) > SAME:
             start = complex(_crossing(start, leg, above), above)
+
         return [Leg(start), *(leg for _, leg in inside)]
 
 
 def _monotone(legs: list[Leg]) -> Iterator[tuple[complex, Leg]]:
-    """The legs behind the first one and where they start, arcs in parts along which neither z nor x turns
-    back."""
+    """The legs behind the first and their starts, arcs in parts along which no axis turns back."""
     at = legs[0].end
     for leg in legs[1:]:
         for end in (*_quadrants(at, leg), leg.end):
@@ -233,11 +224,8 @@ def _quadrants(start: complex, leg: Leg) -> list[complex]:
     quarter, begin = math.pi / 2.0, cmath.phase(from_centre)
     turns = sorted((n * quarter - begin) * leg.turning for n in range(-8, 9))
     within = SAME / abs(from_centre)
-    return [
-        leg.centre + from_centre * cmath.exp(1j * leg.turning * turn)
-        for turn in turns
-        if within < turn < sweep - within
-    ]
+    inside = (turn for turn in turns if within < turn < sweep - within)
+    return [leg.centre + from_centre * cmath.exp(1j * leg.turning * turn) for turn in inside]
 
 
 def facing(cycle: Callable[..., Iterator[Leg]], *given: Any) -> Iterator[Leg]:

@@ -120,12 +120,8 @@ def _without_number(text: str, behind: str) -> str:
     if letter := _LETTERS.match(text):
         return f"{letter[0].strip()} has the letter {letter[1]} in its number; write the digit {_DIGITS[letter[1]]}"
     known = next((what for name, what in _NAMES if re.match(name, text, re.IGNORECASE)), "")
-    known = (
-        known
-        or (_IN_LINES[-1][1] if behind == "{" else "")
-        or (CHARACTERS.get(behind, "") if behind not in (")", "/") else "")
-        or look_alike(behind)
-    )
+    of_behind = CHARACTERS | {"{": _IN_LINES[-1][1], ")": "", "/": ""}
+    known = known or of_behind.get(behind, "") or look_alike(behind)
     return known or "a letter without a number; write digits after it, such as X1.5"
 
 

@@ -7,10 +7,14 @@ feed move stay. A block of rotary axes can be given under G93 instead, by how of
 minute; the next other one has G94 and its feed.
 
 Numbers are rounded down to `SIGNIFICANT` digits: each move takes up to 0.1 % longer than asked.
+
+What was read from something else (HPGL) is written out as RS274NGC in mm, which reads back as the same program:
+coordinates are rounded to `flat.DECIMALS`, a tenth of what the reader may be off.
 """
 
 import math
 import re
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,17 +22,18 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.nc.language.detect import without_leader
+from planner.nc.language.flat import flat_number, in_comment
 from planner.nc.lexer import NUMBER, Words, split_words
-from planner.nc.program import FEED_MOVES, Program, extruder_alone, plain
+from planner.nc.program import FEED_MOVES, Kind, PathControl, Program, extruder_alone, plain
 
 SIGNIFICANT = 4  # digits of a feed
-# The lowest feed that is written [mm/s]: no control moves slower on purpose, and F0 is an error.
-FEED_MIN = 0.01
-# A feed within this share of the programmed one is the programmed one [-]: the rounding of lengths and times.
-SAME_FEED = 1e-6
+FEED_MIN = 0.01  # the lowest feed that is written [mm/s]: no control moves slower, and F0 is an error
+SAME_FEED = 1e-6  # a feed within this share of the programmed one is that [-]: rounding of lengths and times
 G93, G94, G95 = 93, 94, 95
 _F, _G = ord("F"), ord("G")
 _NUMBER = re.compile(NUMBER)
+STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
+_CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
 Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
 
 
@@ -86,14 +91,7 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
 
 
 class _SourceRows:
-    """Units, F words and feed modes on the R rows of the source.
-
-    unit      : (R,) length unit in force before the row [mm]: what its F word is read in
-    f_word    : (R,) index of its F word, or -1
-    feed      : (R,) F in force, in the row's own units; NaN before the first
-    mode      : (R,) G93, G94 or G95 in force
-    mode_word : (R,) index of its word for the feed mode, or -1
-    """
+    """Units, F words and feed modes on the R rows of the source."""
 
     def __init__(self, words: Words):
         rows = np.arange(len(words.line))
@@ -101,16 +99,20 @@ class _SourceRows:
         code = np.where(words.letter == _G, np.rint(words.value * 10.0), -1.0)
         switch = np.flatnonzero(np.isin(code, (200.0, 210.0)))
         unit = np.append(1.0, np.where(code[switch] == 200.0, MM_PER_INCH, 1.0))
+        # (R,) length unit in force before the row [mm]: what its F word is read in
         self.unit = unit[np.searchsorted(of_word[switch], rows)]
+        # (R,) index of its F word, and of its word for the feed mode, or -1
         self.f_word, self.mode_word = np.full((2, len(rows)), -1)
         given = np.flatnonzero(words.letter == _F)
         self.f_word[of_word[given]] = given
         last = np.maximum.accumulate(np.where(self.f_word >= 0, rows, -1))
         feed = words.value[self.f_word[last]] * (self.unit[last] / self.unit)
+        # (R,) F in force, in the row's own units; NaN before one
         self.feed = np.where(last >= 0, feed, np.nan)
         switch = np.flatnonzero(np.isin(code, (10.0 * G93, 10.0 * G94, 10.0 * G95)))
         self.mode_word[of_word[switch]] = switch
         mode = np.append(G94, np.rint(code[switch] / 10.0)).astype(np.int64)
+        # (R,) G93, G94 or G95 in force
         self.mode = mode[np.searchsorted(of_word[switch], rows, side="right")]
 
 
@@ -118,8 +120,7 @@ class _New(NamedTuple):
     """Feeds to write on the rows (n,) of feed moves."""
 
     row: Array
-    # wanted and programmed: (n,) feeds in each row's units; wanted is NaN where the programmed one holds
-    wanted: FloatArray
+    wanted: FloatArray  # (n,) feeds in each row's units, as `programmed`; NaN where that holds
     programmed: FloatArray
     often: FloatArray  # (n,) runs per minute, under G93; NaN for a feed
 
@@ -127,8 +128,7 @@ class _New(NamedTuple):
 def _edits(words: Words, in_source: _SourceRows, new: _New) -> list[Edit]:
     """The F words, and those of the feed mode, to write on rows of feed moves, in the order of the source."""
     edits: list[Edit] = []
-    texts: dict[float, str] = {}
-    as_given: dict[float, str] = {}
+    rounded, as_given = cache(round_down), cache(plain)
     move = np.full(len(in_source.f_word), -1)
     move[new.row] = np.arange(len(new.row))
     in_force, ours = 0.0, False  # [mm per minute]; under a G93 that was written here
@@ -144,11 +144,9 @@ def _edits(words: Words, in_source: _SourceRows, new: _New) -> list[Edit]:
         if k < 0 and word < 0:
             continue
         if k >= 0 and not math.isnan(new.wanted[k]):
-            value = float(new.wanted[k])
-            number = texts.get(value) or texts.setdefault(value, round_down(value))
+            number = rounded(float(new.wanted[k]))
         elif k >= 0 and (word < 0 or ours):
-            value = float(new.programmed[k])
-            number = as_given.get(value) or as_given.setdefault(value, plain(value))
+            number = as_given(float(new.programmed[k]))
         given = float(number or words.value[word]) * in_source.unit[r]
         if k >= 0 and ours:
             edits += _edited(words, r, word, number, "G94")
@@ -190,3 +188,54 @@ def _end(words: Words, word: int) -> int:
     match = _NUMBER.match(words.data, after)
     assert match is not None
     return after + len(match.group().rstrip(b" \t"))
+
+
+def program_text(program: Program, feeds: FloatArray, tolerance: float) -> str:
+    """The NC text of a program in the plane z = 0.
+
+    feeds     : (B,) feed of each block [mm/s]; looked at where a block moves at a feed, and finite and not
+                negative there
+    tolerance : contour error budget [mm], for G64 P
+    """
+    mode = PathControl(int(program.path_control[0])) if len(program) else PathControl.BLEND
+    head = f"({in_comment(program.source)}, written by feedrate-planner)", "G21 G17 G90 G91.1 G94 G40 G49"
+    control = _CONTROL.get(mode, f"G64 P{plain(tolerance)}")
+    return "\n".join([*head, control, *_blocks(program, feeds), "M2", ""])
+
+
+def _blocks(program: Program, feeds: FloatArray) -> list[str]:
+    lines: list[str] = []
+    position = program.start
+    arc = dict(zip(program.arc_block.tolist(), range(len(program.arc_block)), strict=True))
+    events = list(program.events)
+    next_event, last_feed = 0, ""
+    for block, kind in enumerate(program.kind.tolist()):
+        stopped = False
+        while next_event < len(events) and events[next_event].block <= block:
+            stopped = events[next_event].text in STOPPING
+            lines.append(events[next_event].text)
+            next_event += 1
+        end = program.end[block]
+        if kind == Kind.STOP and stopped:
+            pass  # by the last event
+        elif kind in (Kind.STOP, Kind.DWELL):
+            lines.append(f"G4 P{plain(float(program.dwell[block]))}")
+        elif kind == Kind.RAPID:
+            lines.append(f"G0 {_xy(end)}")
+        else:
+            feed = round_down(max(float(feeds[block]), FEED_MIN) * SECONDS_PER_MINUTE)
+            code = f"G1 {_xy(end)}" if kind == Kind.LINE else _arc(program, arc[block], position, end)
+            lines.append(code if feed == last_feed else f"{code} F{feed}")
+            last_feed = feed
+        position = end
+    return [*lines, *(event.text for event in events[next_event:])]
+
+
+def _xy(end: FloatArray) -> str:
+    return f"X{flat_number(end[0])} Y{flat_number(end[1])}"
+
+
+def _arc(program: Program, row: int, position: FloatArray, end: FloatArray) -> str:
+    centre = program.arc_center[row] - position
+    code = "G3" if program.arc_sweep[row] > 0 else "G2"
+    return f"{code} {_xy(end)} I{flat_number(centre[0])} J{flat_number(centre[1])}"

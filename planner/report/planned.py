@@ -24,8 +24,7 @@ from planner.nc.points import own_text
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import AUTO
-from planner.nc.text import program_text
-from planner.nc.writer import SAME_FEED, retimed
+from planner.nc.writer import SAME_FEED, program_text, retimed
 from planner.report.word_feed import ABOVE, PlannedBlocks, feeds_of, planned_blocks
 
 if TYPE_CHECKING:

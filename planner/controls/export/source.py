@@ -17,8 +17,7 @@ from planner.nc.points import own_text
 from planner.nc.program import FEED_MOVES, Kind, Program, plain
 from planner.nc.reader import parse_program
 from planner.nc.reading import ABSOLUTE, AUTO, INCREMENTAL, LINUXCNC, Reading
-from planner.nc.text import program_text
-from planner.nc.writer import FEED_MIN, round_down
+from planner.nc.writer import FEED_MIN, program_text, round_down
 from planner.planning.job.plan import Plan
 
 CURVE = "G6.2"  # of a curve without a text, which no control is given: chords stand for it

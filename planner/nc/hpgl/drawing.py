@@ -36,8 +36,8 @@ _NO_POINTS = (
 ON_A_LINE = 1e-9
 
 
-class ScalingError(ValueError):
-    """The scaling cannot be used; the text says why."""
+class NotDrawn(ValueError):
+    """The instruction cannot be executed; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -55,46 +55,41 @@ class Scaling:
         return self.origin[0] + self.factor[0] * x, self.origin[1] + self.factor[1] * y
 
     def handedness(self) -> float:
-        """1 where a left turn stays one, -1 where it is mirrored. Raises ScalingError for ellipses."""
+        """1 where a left turn stays one, -1 where it is mirrored. Raises NotDrawn for ellipses."""
         fx, fy = self.factor
         if abs(abs(fx) - abs(fy)) > SAME_FACTOR * abs(fx):
-            raise ScalingError(
-                f"a circle becomes an ellipse: SC scales x by {fx:g} and y by {fy:g}; give both the same scale"
-            )
+            scales = f"SC scales x by {fx:g} and y by {fy:g}"
+            raise NotDrawn(f"a circle becomes an ellipse: {scales}; give both the same scale")
         return math.copysign(1.0, fx * fy)
 
     def with_points(self, numbers: Sequence[float]) -> Scaling:
-        """After IP. Raises ScalingError if an SC in force cannot be used with the new points."""
-        p1 = p2 = None
-        if numbers:
-            p1 = numbers[0], numbers[1]
-        if len(numbers) == 4:
-            p2 = numbers[2], numbers[3]
-        elif p1 is not None and self.p1 is not None and self.p2 is not None:  # P2 keeps its distance
+        """After IP. Raises NotDrawn if an SC in force cannot be used with the new points."""
+        p1 = (numbers[0], numbers[1]) if numbers else None
+        p2 = (numbers[2], numbers[3]) if len(numbers) == 4 else None
+        # P2 keeps its distance
+        if p2 is None and p1 is not None and self.p1 is not None and self.p2 is not None:
             p2 = self.p2[0] + p1[0] - self.p1[0], self.p2[1] + p1[1] - self.p1[1]
         return dataclasses.replace(self, p1=p1, p2=p2).with_range(self.user)
 
     def with_range(self, numbers: Sequence[float]) -> Scaling:
-        """After SC; without numbers scaling is off. Raises ScalingError."""
+        """After SC; without numbers scaling is off. Raises NotDrawn."""
         if not numbers:
             return Scaling(self.p1, self.p2)
         kind = numbers[4] if len(numbers) > 4 else _ANISOTROPIC
         if kind not in (_ANISOTROPIC, _ISOTROPIC, _POINT_FACTOR):
-            raise ScalingError(f"no scaling of type {kind:g}; allowed are 0, 1 and 2")
-        if kind == _POINT_FACTOR:
-            if self.p1 is None:
-                raise ScalingError(_NO_POINTS)
+            raise NotDrawn(f"no scaling of type {kind:g}; allowed are 0, 1 and 2")
+        if self.p1 is None or (self.p2 is None and kind != _POINT_FACTOR):
+            raise NotDrawn(_NO_POINTS)
+        if self.p2 is None or kind == _POINT_FACTOR:
             factor, left_over = (numbers[1], numbers[3]), (0.0, 0.0)
         else:
-            if self.p1 is None or self.p2 is None:
-                raise ScalingError(_NO_POINTS)
             size = numbers[1] - numbers[0], numbers[3] - numbers[2]
             if 0.0 in size:
-                raise ScalingError(f"a range of user units is empty; write {FORMS['SC']}")
+                raise NotDrawn(f"a range of user units is empty; write {FORMS['SC']}")
             window = self.p2[0] - self.p1[0], self.p2[1] - self.p1[1]
             factor, left_over = _factors(window, size, numbers, kind)
         if 0.0 in factor:
-            raise ScalingError("a scale of 0 leaves nothing of the drawing; check IP and SC")
+            raise NotDrawn("a scale of 0 leaves nothing of the drawing; check IP and SC")
         x, y = (self.p1[k] + left_over[k] - factor[k] * numbers[2 * k] for k in range(2))
         return Scaling(self.p1, self.p2, (x, y), factor, tuple(numbers))
 

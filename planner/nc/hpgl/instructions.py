@@ -33,9 +33,7 @@ TEXT = {
     **dict.fromkeys(("SM", "DT", "PE", "DL", "UC"), _TO_TERMINATOR),
     "CO": re.compile(rb'\s*(?:"[^"]*"|[^;]*);?'),
 }
-# The largest number: lengths beyond 1e9 have lost the micrometre in double precision and are certainly a
-# mistake.
-NUMBER_MAX = 1e9
+NUMBER_MAX = 1e9  # lengths beyond have lost the micrometre in double precision and are certainly a mistake
 _BLANK = re.compile(rb"(?:[\s;]|\xef\xbb\xbf)*")
 CONTROL = rb"(?:\x1b(?:\.[@HIMNPQST](?:[\d; ]*:)?|\.[()A-Z]|%-?\d*[A-Z]|[&*(][^A-Z\x1b]*[A-Z]|E)|@PJL[^\n]*)"
 _CONTROL = re.compile(CONTROL)
@@ -64,32 +62,29 @@ class Form:
         return f"{self.name} {self.numbers}".rstrip()
 
 
-# By their names: the numbers that each takes, and how many of them there may be (None for any number of
-# pairs).
+# By their names: the numbers that each takes, and how many of them there may be (None: any number of pairs).
 FORMS = {
-    form.name: form
-    for form in (
-        Form("IN", "", (0, 1)),
-        Form("DF", "", (0,)),
-        Form("PU", "x,y,...", None),
-        Form("PD", "x,y,...", None),
-        Form("PA", "x,y,...", None),
-        Form("PR", "dx,dy,...", None),
-        Form("AA", "x,y,sweep", (3, 4)),
-        Form("AR", "dx,dy,sweep", (3, 4)),
-        Form("AT", "x,y,xend,yend", (4, 5)),
-        Form("RT", "dx,dy,dxend,dyend", (4, 5)),
-        Form("CI", "radius", (1, 2)),
-        Form("EA", "x,y", (2,)),
-        Form("ER", "dx,dy", (2,)),
-        Form("SP", "pen", (0, 1)),
-        Form("VS", "speed in cm/s", (0, 1, 2)),
-        Form("IP", "x1,y1,x2,y2", (0, 2, 4)),
-        Form("SC", "xmin,xmax,ymin,ymax", (0, 4, 5, 7)),
-        Form("PG", "", (0, 1)),
-        Form("AF", "", (0,)),
-        Form("AH", "", (0,)),
-        Form("FR", "", (0,)),
+    name: Form(name, numbers, counts)
+    for name, numbers, counts in (
+        ("IN", "", (0, 1)),
+        ("DF", "", (0,)),
+        ("PU", "x,y,...", None),
+        ("PD", "x,y,...", None),
+        ("PA", "x,y,...", None),
+        ("PR", "dx,dy,...", None),
+        ("AA", "x,y,sweep", (3, 4)),
+        ("AR", "dx,dy,sweep", (3, 4)),
+        ("AT", "x,y,xend,yend", (4, 5)),
+        ("RT", "dx,dy,dxend,dyend", (4, 5)),
+        ("CI", "radius", (1, 2)),
+        ("EA", "x,y", (2,)),
+        ("ER", "dx,dy", (2,)),
+        ("SP", "pen", (0, 1)),
+        ("VS", "speed in cm/s", (0, 1, 2)),
+        ("IP", "x1,y1,x2,y2", (0, 2, 4)),
+        ("SC", "xmin,xmax,ymin,ymax", (0, 4, 5, 7)),
+        ("PG", "", (0, 1)),
+        *((end, "", (0,)) for end in PAGE_ENDS[1:]),
     )
 }
 
@@ -164,20 +159,15 @@ def instructions(data: bytes, report: Report, note: Callable[[str], None]) -> It
 
 def _passed_over(data: bytes, at: int, report: Report, note: Callable[[str], None]) -> int:
     """Where to go on after what is no instruction: device control is noted, everything else is a fault."""
-    control = _CONTROL.match(data, at)
-    if control:
+    if control := _CONTROL.match(data, at):
         note("device control (ESC sequences, @PJL lines) is left out")
         return control.end()
-    number = _NUMBER.match(data, at)
-    if number:
+    if number := _NUMBER.match(data, at):
         report(at, number.end(), "a number without an instruction before it")
         return number.end()
     what = "a letter by itself" if data[at : at + 1].isalpha() else "this character"
-    report(
-        at,
-        at + 1,
-        f"{what} starts no instruction; an instruction is two letters and numbers, such as PU0,400",
-    )
+    form = "an instruction is two letters and numbers, such as PU0,400"
+    report(at, at + 1, f"{what} starts no instruction; {form}")
     return at + 1
 
 

@@ -20,18 +20,9 @@ from planner.machine import Machine, Plotter
 from planner.nc.arcs import Arc
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Fault, Notes
-from planner.nc.hpgl.drawing import Point, Scaling, ScalingError, circle_through
-from planner.nc.hpgl.instructions import (
-    ALLOWED,
-    CHANGING,
-    FORMS,
-    IGNORED,
-    PAGE_ENDS,
-    REFUSED,
-    WITH_NUMBERS,
-    Instruction,
-    instructions,
-)
+from planner.nc.hpgl import instructions as written
+from planner.nc.hpgl.drawing import NotDrawn, Point, Scaling, circle_through
+from planner.nc.hpgl.instructions import FORMS, IGNORED, Instruction
 from planner.nc.program import Kind, Program
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.state import State, state_of
@@ -46,10 +37,6 @@ WORD_SHOWN = 20  # characters of an instruction in a message
 SWEEP_MIN = 1e-6
 
 
-class _NotDrawn(Exception):
-    """The instruction cannot be executed; the text says why."""
-
-
 def read_drawing(
     data: bytes, machine: Machine | None, source: str, reading: Reading = AS_USUAL
 ) -> tuple[Program, Sequence[Fault]]:
@@ -57,9 +44,12 @@ def read_drawing(
     InputError for a file without any instruction."""
     run = _Run(data, machine, reading)
     found = 0
-    for instruction in instructions(data, run.report, run.note):
-        run.execute(instruction)
+    for instruction in written.instructions(data, run.report, run.note):
         found += 1
+        try:
+            run.execute(instruction)
+        except NotDrawn as fault:
+            run.report(instruction.at, instruction.end, str(fault))
     if not found and not run.reports:
         text = "the plotter file is empty: there is no instruction in it"
         raise InputError(text, source=source, line=1, column=1)
@@ -102,8 +92,7 @@ class _Run:
 
     def faults(self) -> list[Fault]:
         """All faults in the order of the file."""
-        reports = sorted(self.reports)
-        return [Fault(*self._place(at), self._word(at, end), message) for at, end, message in reports]
+        return [Fault(*self._place(at), self._word(at, end), said) for at, end, said in sorted(self.reports)]
 
     def _word(self, at: int, end: int) -> str:
         text = self.data[at:end].decode("latin-1").strip()[:WORD_SHOWN]
@@ -134,31 +123,24 @@ class _Run:
         return line + 1, at - (self._line_ends[line - 1] if line else -1)
 
     def execute(self, it: Instruction) -> None:
-        try:
-            self._execute(it)
-        except (_NotDrawn, ScalingError) as fault:
-            self.report(it.at, it.end, str(fault))
-
-    def _execute(self, it: Instruction) -> None:
         name, numbers = it.name, it.numbers
         form = FORMS.get(name)
-        known = self.strict or name in IGNORED or name in REFUSED or name == "SM"
+        no_symbol = name == "SM" and not it.text.strip(b"; \r\n")
+        known = self.strict or name in IGNORED or name in written.REFUSED or name == "SM"
         if (form is None or (name == "RT" and not form.fits(len(numbers)))) and not known:
             self.unknown.append(it.at)  # RT is an arc of HP's plotters, and something else of other makers
-            return
-        if form is None:
-            if name in IGNORED or (name == "SM" and not it.text.strip(b"; \r\n")):
-                if name in CHANGING or (name in WITH_NUMBERS and numbers):
-                    if self.strict:
-                        raise _NotDrawn(f"{IGNORED[name]} (assumed without --strict)")
-                    self.changing.setdefault(name, []).append(it.at)
-                    return
-                self.ignored.setdefault(name, []).append(it.at)
-                return
-            raise _NotDrawn(REFUSED.get(name, f"there is no such instruction; allowed are {ALLOWED}"))
-        if not form.fits(len(numbers)):
-            raise _NotDrawn(f"{len(numbers)} numbers found; write {form}")
-        _EXECUTE[name](self, it)
+        elif form is None and (name in IGNORED or no_symbol):
+            changes = name in written.CHANGING or (name in written.WITH_NUMBERS and numbers)
+            if changes and self.strict:
+                raise NotDrawn(f"{IGNORED[name]} (assumed without --strict)")
+            (self.changing if changes else self.ignored).setdefault(name, []).append(it.at)
+        elif form is None:
+            allowed = f"there is no such instruction; allowed are {written.ALLOWED}"
+            raise NotDrawn(written.REFUSED.get(name, allowed))
+        elif not form.fits(len(numbers)):
+            raise NotDrawn(f"{len(numbers)} numbers found; write {form}")
+        else:
+            _EXECUTE[name](self, it)
 
     def _end_page(self, it: Instruction) -> None:
         self.ignored.setdefault(it.name, []).append(it.at)
@@ -185,11 +167,11 @@ class _Run:
         centre = self._point(*it.numbers[:2], absolute=it.name == "AA")
         degrees = it.numbers[2]
         if not 0 < abs(degrees) <= FULL_TURN:
-            raise _NotDrawn(f"a sweep of {degrees:g} degrees; allowed are -360 to 360, but not 0")
+            raise NotDrawn(f"a sweep of {degrees:g} degrees; allowed are -360 to 360, but not 0")
         sweep = degrees * RAD_PER_DEG * self.scaling.handedness()
         dx, dy = self.position[0] - centre[0], self.position[1] - centre[1]
         if not math.hypot(dx, dy) > 0:
-            raise _NotDrawn("the arc has no radius: the pen stands on its centre")
+            raise NotDrawn("the arc has no radius: the pen stands on its centre")
         end = self.position
         if abs(degrees) < FULL_TURN:
             cos, sin = math.cos(sweep), math.sin(sweep)
@@ -210,7 +192,7 @@ class _Run:
     def _circle(self, it: Instruction) -> None:
         radius, at = it.numbers[0], it.at
         if radius == 0:
-            raise _NotDrawn("a circle of radius 0; write its radius, such as CI400")
+            raise NotDrawn("a circle of radius 0; write its radius, such as CI400")
         handedness = self.scaling.handedness()
         centre, was_down = self.position, self.down
         start = self._point(radius, 0.0, absolute=False)
@@ -233,7 +215,7 @@ class _Run:
     def _select_pen(self, it: Instruction) -> None:
         pen = it.numbers[0] if it.numbers else 0.0
         if pen != round(pen) or pen < 0:
-            raise _NotDrawn("a pen is a whole number, 0 (put the pen away) or more")
+            raise NotDrawn("a pen is a whole number, 0 (put the pen away) or more")
         if pen == self.pen:
             return
         was_down = self.down
@@ -248,18 +230,17 @@ class _Run:
         numbers = it.numbers
         speed = numbers[0] * MM_PER_CM if numbers else math.inf
         if not speed > 0:
-            raise _NotDrawn("a speed must be positive; write the pen's speed in cm/s, such as VS20")
+            raise NotDrawn("a speed must be positive; write the pen's speed in cm/s, such as VS20")
         if len(numbers) == 2:
             self.speed_of_pen[round(numbers[1])] = speed
         else:
             self.speed, self.speed_of_pen = speed, {}
 
     def _point(self, x: float, y: float, *, absolute: bool) -> Point:
-        unit = self.plotter.unit
+        unit, (fx, fy), (x0, y0) = self.plotter.unit, self.scaling.factor, self.position
         if absolute:
             x, y = self.scaling.place(x, y)
             return x * unit, y * unit
-        (fx, fy), (x0, y0) = self.scaling.factor, self.position
         return x0 + x * fx * unit, y0 + y * fy * unit
 
     def _go(self, end: Point, at: int) -> None:
@@ -274,14 +255,12 @@ class _Run:
             return
         self._begin_to_draw()
         self.position = end
-        arc = Arc(np.array([*centre, 0.0]), sweep)
-        self.table.add_arc(arc, _NORMAL, self._ready(at), self.state)
+        self.table.add_arc(Arc(np.array([*centre, 0.0]), sweep), _NORMAL, self._ready(at), self.state)
 
     def _ready(self, at: int) -> int:
-        """Bring the state to where the pen is, and make room for a block and an event; returns the line."""
+        """Bring the state to where the pen is; returns the line."""
         self.state.position[:2] = self.position
         self.state.feed = self.speed_of_pen.get(self.pen, self.speed)
-        self.table.make_room(1)
         return self._place(at)[0]
 
     def _add_event(self, letter: str, value: float, at: int) -> None:
@@ -312,6 +291,6 @@ _EXECUTE: dict[str, Callable[[_Run, Instruction], None]] = {
     "SP": _Run._select_pen,
     "VS": _Run._select_speed,
     **dict.fromkeys(("IP", "SC", "DF"), _Run._scale),
-    **dict.fromkeys(PAGE_ENDS, _Run._end_page),
+    **dict.fromkeys(written.PAGE_ENDS, _Run._end_page),
     "IN": _Run._begin_anew,
 }

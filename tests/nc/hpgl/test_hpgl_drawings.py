@@ -19,7 +19,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program, read_program
-from planner.nc.text import program_text
+from planner.nc.writer import program_text
 
 MACHINE = load_machine("plotter")
 

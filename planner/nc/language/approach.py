@@ -41,16 +41,13 @@ class ContourWay:
     angle: float  # CCA [degrees]
 
     def __post_init__(self) -> None:
+        length, angle = (self.length > 0.0, "length LEN, above 0"), 0.0 < self.angle <= _FULL
         needed = {
-            "LT": (self.length > 0.0, "length LEN, above 0"),
-            "LN": (self.length > 0.0, "length LEN, above 0"),
-            "CT": (0.0 < self.angle <= _FULL, "angle CCA, above 0 and up to 360 degrees"),
-            "LCT": (self.radius > 0.0, "radius R, above 0"),
+            **dict.fromkeys(("LT", "LN"), (length,)),
+            "CT": ((angle, "angle CCA, above 0 and up to 360 degrees"), (self.radius != 0.0, "radius R")),
+            "LCT": ((self.radius > 0.0, "radius R, above 0"),),
         }
-        given, what = needed[self.kind]
-        if given and self.kind == "CT":
-            given, what = self.radius != 0.0, "radius R"
-        if not given:
+        for what in (what for given, what in needed[self.kind] if not given):
             raise ValueError(f"{self.name} {self.kind} needs its {what}")
 
     def move(
@@ -110,40 +107,29 @@ class ContourWay:
             moves.append(self.move(places[-2], places[-1], rises=True))
         return [row for one in moves for row in one.rows(_NORMAL)], places[-1]
 
+    def approach(
+        self, start: FloatArray, first: FloatArray, motion: int, radius: float, side: int, move: Move
+    ) -> tuple[list[TravelRow], OffsetMoves | None]:
+        """APPR: the way to a contour, whose first move is given, and its compensation. Raises ValueError.
 
-@dataclass(frozen=True)
-class Approach:
-    """APPR, waiting for the first move of its contour.
-
-    start  : (3,) where the tool is [mm];  first : (3,) the first contour point [mm], both in the work system
-    motion : the code that leads to the way, 0 or 1
-    radius : of the tool that is compensated [mm], else 0
-    side   : 1 left, -1 right
-    """
-
-    way: ContourWay
-    start: FloatArray
-    first: FloatArray
-    motion: int
-    radius: float
-    side: int
-
-    def rows(self, move: Move) -> tuple[list[TravelRow], OffsetMoves | None]:
-        """The way to the contour, whose first move is given, and its compensation. Raises ValueError."""
+        start, first : (3,) where the tool is, and the first contour point, both in the work system [mm]
+        motion       : the code that leads to the way, 0 or 1
+        radius, side : of the tool that is compensated [mm], else 0; 1 left, -1 right
+        """
         if move.stands(_NORMAL):
             raise ValueError("behind APPR a move in the plane is expected, the first of the contour")
-        way, tangent, offset = self.way, move.tangent(_NORMAL), None
-        normal = 1j * self.side * tangent
-        if self.radius > 0.0:
-            offset = OffsetMoves(self.first, self.radius, self.side, _NORMAL)
-            offset.begin_at(self.first, tangent)
-        contour = in_plane(self.first, _NORMAL) + self.radius * normal
-        before, arc = way.far_end(contour, tangent, normal, in_plane(self.start, _NORMAL), leaves=False)
-        there, deep = (at_place(before, height, _NORMAL) for height in (self.start, self.first))
-        moves = [way.move(self.start, there)]
-        if way.kind != "LCT" or not way.row.words:
-            moves[0] = replace(moves[0], rest=replace(way.row, words=[]), code=self.motion)
+        tangent, offset = move.tangent(_NORMAL), None
+        normal = 1j * side * tangent
+        if radius > 0.0:
+            offset = OffsetMoves(first, radius, side, _NORMAL)
+            offset.begin_at(first, tangent)
+        contour = in_plane(first, _NORMAL) + radius * normal
+        before, arc = self.far_end(contour, tangent, normal, in_plane(start, _NORMAL), leaves=False)
+        there, deep = (at_place(before, height, _NORMAL) for height in (start, first))
+        moves = [self.move(start, there)]
+        if self.kind != "LCT" or not self.row.words:
+            moves[0] = replace(moves[0], rest=replace(self.row, words=[]), code=motion)
         if deep[_NORMAL] != there[_NORMAL]:
-            moves.append(way.move(there, deep, rises=True))
-        moves.append(way.move(deep, at_place(contour, self.first, _NORMAL), arc))
+            moves.append(self.move(there, deep, rises=True))
+        moves.append(self.move(deep, at_place(contour, first, _NORMAL), arc))
         return [row for one in moves for row in one.rows(_NORMAL)], offset

@@ -58,9 +58,9 @@ def compile_procedures(
     text: list[str] = []
     makers: list[Callable[..., object]] = []
     for k, procedure in enumerate(procedures):
-        for line, place in _Function(procedure, language, rows, makers).source(f"p{k}"):
-            text.append(line)
-            found.places.append(place)
+        lines = _Function(language, rows, makers).source(procedure, f"p{k}")
+        text += [line for line, _ in lines]
+        found.places += [place for _, place in lines]
     namespace: dict[str, object] = {"whole": whole, "turns_of": turns_of, "M": makers, **FUNCTIONS}
     exec(compile("\n".join(text), marker, "exec"), namespace)
     for k, procedure in enumerate(procedures):
@@ -69,42 +69,36 @@ def compile_procedures(
 
 
 class _Function:
-    def __init__(
-        self,
-        procedure: tree.Procedure,
-        language: tree.Language,
-        rows: AppendedRows,
-        makers: list[Callable[..., object]],
-    ):
-        self.procedure, self.language, self.rows, self.makers = procedure, language, rows, makers
+    def __init__(self, language: tree.Language, rows: AppendedRows, makers: list[Callable[..., object]]):
+        self.language, self.rows, self.makers = language, rows, makers
         self.say = Expressions(language)
         self.blocks = BasicBlocks()
         self.loops: list[tuple[str, int, int]] = []  # name, label of the next turn, label after the loop
         self.counters = 0  # of repeated loops, which count in L; L[0] is the value of the procedure
         self._seen = 0  # of `numbers`
 
-    def source(self, name: str) -> list[tuple[str, tree.SourcePlace]]:
+    def source(self, procedure: tree.Procedure, name: str) -> list[tuple[str, tree.SourcePlace]]:
         """Lines of Python with their places."""
-        place = self.procedure.place
-        labels = (s for s in tree.statements_in(self.procedure.body) if isinstance(s, tree.Label))
+        place = procedure.place
+        labels = (s for s in tree.statements_in(procedure.body) if isinstance(s, tree.Label))
         self.blocks.numbers += [(label.number, self.blocks.label()) for label in labels]
-        self._body(self.procedure.body)
+        self._body(procedure.body)
         lines = self.blocks.source(place)
         return [(f"def {name}(run,L):", place), (f" {_HEAD}", place), *lines, (" return L.get(0)", place)]
 
     def _body(self, body: Sequence[tree.Statement]) -> None:
         for statement in body:
-            try:
-                _WRITE[type(statement)](self, statement)
+            try:  # the method of its type, as `ast.NodeVisitor` finds them
+                getattr(self, f"_{type(statement).__name__}")(statement)
             except OverflowError:
                 raise tree.ProgramFault(statement.place, "a number is too large") from None
 
-    def _plain_rows(self, plain: tree.PlainRows) -> None:
+    def _PlainRows(self, plain: tree.PlainRows) -> None:
         self.blocks.put(f"S({self.rows.add_entry(plain.first, plain.last)})", plain.place)
         if plain.may_end:
             self.blocks.put("run.flush()", plain.place)
 
-    def _line(self, line: tree.Line) -> None:
+    def _Line(self, line: tree.Line) -> None:
         words, given = [], []
         for word in line.words:
             constant = word.value.value if isinstance(word.value, tree.Number) else None
@@ -128,14 +122,15 @@ class _Function:
     def _assign(self, target: tree.Parameter, value: str, place: tree.SourcePlace) -> str:
         if isinstance(target, tree.Named):
             if target.shared and target.name in self.language.system_names:
-                text = f"the control sets #<{target.name}> itself; it can only be read"
-                raise tree.ProgramFault(place, text)
+                raise tree.ProgramFault(
+                    place, f"the control sets #<{target.name}> itself; it can only be read"
+                )
             return f"{'G' if target.shared else 'L'}[{target.name!r}]={value}"
         if isinstance(target.index, tree.Number) and self.say.stored(target.index.value):
             return f"P[{int(target.index.value)}]={value}"
         return f"run.put({self.say.value(target.index)},{value})"
 
-    def _if(self, statement: tree.If) -> None:
+    def _If(self, statement: tree.If) -> None:
         after = self.blocks.label()
         for condition, body in statement.branches:
             then, otherwise = self.blocks.label(), self.blocks.label()
@@ -147,7 +142,7 @@ class _Function:
         self._body(statement.otherwise)
         self.blocks.here(after)
 
-    def _loop(self, loop: tree.Loop) -> None:
+    def _Loop(self, loop: tree.Loop) -> None:
         turn, again, after = self.blocks.label(), self.blocks.label(), self.blocks.label()
         if loop.kind == "repeat":
             self.counters += 1
@@ -162,9 +157,8 @@ class _Function:
         self.loops.append((loop.name, again, after))
         self._body(loop.body)
         self.loops.pop()
-        if any(
-            isinstance(s, tree.Leave) and s.on and s.loop == loop.name for s in tree.statements_in(loop.body)
-        ):
+        inner = tree.statements_in(loop.body)
+        if any(isinstance(s, tree.Leave) and s.on and s.loop == loop.name for s in inner):
             self.blocks.here(again)
         self._tick(loop.place)
         if loop.kind == "repeat":
@@ -172,18 +166,18 @@ class _Function:
         self.blocks.go(loop.place, turn, condition, after)
         self.blocks.here(after)
 
-    def _leave(self, leave: tree.Leave) -> None:
+    def _Leave(self, leave: tree.Leave) -> None:
         for name, again, after in reversed(self.loops):
             if name == leave.loop:
                 self.blocks.go(leave.place, again if leave.on else after)
                 return
         raise tree.ProgramFault(leave.place, f"there is no loop {leave.loop} around this")
 
-    def _label_here(self, _: tree.Label) -> None:
+    def _Label(self, _: tree.Label) -> None:
         self.blocks.here(self.blocks.numbers[self._seen][1])
         self._seen += 1
 
-    def _goto(self, goto: tree.Goto) -> None:
+    def _Goto(self, goto: tree.Goto) -> None:
         self._tick(goto.place)
         if isinstance(goto.target, tree.Number):
             self.blocks.go(goto.place, self._target(goto.place, int(goto.target.value)))
@@ -207,7 +201,7 @@ class _Function:
             raise tree.ProgramFault(place, text)
         return next((label for k, label in found if k >= self._seen), found[0][1])
 
-    def _call(self, call: tree.Call) -> None:
+    def _Call(self, call: tree.Call) -> None:
         procedure = call.procedure
         name = repr(procedure) if isinstance(procedure, str) else f"whole({self.say.value(procedure)})"
         given = "None"
@@ -222,14 +216,14 @@ class _Function:
             self._jump("run.resumed()", call.place)
             self.blocks.here(on)
 
-    def _return(self, statement: tree.Return) -> None:
+    def _Return(self, statement: tree.Return) -> None:
         if statement.label is not None:
             self.blocks.put(f"run.resume={self.say.value(statement.label)}", statement.place)
         if statement.value is not None:
             self.blocks.put(f"L[0]={self.say.value(statement.value)}", statement.place)
         self.blocks.end("-1", statement.place)
 
-    def _message(self, message: tree.Message) -> None:
+    def _Message(self, message: tree.Message) -> None:
         pieces = []
         for piece in message.pieces:
             known = self.language.system_names
@@ -241,30 +235,13 @@ class _Function:
                 pieces.append(self.say.value(piece))
         self.blocks.put(f"run.message({message.place.line},({','.join(pieces)},))", message.place)
 
-    def _modes(self, modes: tree.Modes) -> None:
+    def _Modes(self, modes: tree.Modes) -> None:
         self.blocks.put(f"run.modes({modes.action!r},{tuple(modes.place)!r})", modes.place)
 
-    def _made(self, made: tree.MadeRows) -> None:
+    def _MadeRows(self, made: tree.MadeRows) -> None:
         given = "".join(f"({name!r},{self.say.value(value)})," for name, value in made.given)
+        self.blocks.put(f"run.made(M[{len(self.makers)}],({given}),{tuple(made.place)!r})", made.place)
         self.makers.append(made.maker)
-        text = f"run.made(M[{len(self.makers) - 1}],({given}),{tuple(made.place)!r})"
-        self.blocks.put(text, made.place)
-
-
-_WRITE: dict[type, Callable[..., None]] = {
-    tree.PlainRows: _Function._plain_rows,
-    tree.Line: _Function._line,
-    tree.If: _Function._if,
-    tree.Loop: _Function._loop,
-    tree.Leave: _Function._leave,
-    tree.Label: _Function._label_here,
-    tree.Goto: _Function._goto,
-    tree.Call: _Function._call,
-    tree.Return: _Function._return,
-    tree.Message: _Function._message,
-    tree.Modes: _Function._modes,
-    tree.MadeRows: _Function._made,
-}
 
 
 def statement_of(traceback: TracebackType | None, units: Mapping[str, Compiled]) -> tree.SourcePlace:
@@ -285,14 +262,12 @@ def last_statement(units: Mapping[str, Compiled]) -> tree.SourcePlace:
     return max((place for place in main.places if place.file == 0), key=lambda place: place.at)
 
 
-class Endless(ValueError):
-    """A limit of the running program is reached; `what` says which."""
-
-    def __init__(self, what: str):
-        super().__init__(
-            f"stopped after {what}: does this loop end? if it does, split the program "
-            "(limits: TURNS_MAX, ROWS_MAX, BY_WORD_MAX in planner.nc.language.run)"
-        )
+def endless(what: str) -> ValueError:
+    """The error of a limit of the running program that is reached; `what` says which."""
+    return ValueError(
+        f"stopped after {what}: does this loop end? if it does, split the program "
+        "(limits: TURNS_MAX, ROWS_MAX, BY_WORD_MAX in planner.nc.language.run)"
+    )
 
 
 def sentence(fault: Exception) -> str:

@@ -98,13 +98,11 @@ class OffsetMoves:
 
     def finish(self) -> list[TravelRow]:
         """The moves of the contour, at its end. Raises ValueError."""
-        if not self.started:
-            if self._first is not None:
-                text = "radius compensation is on for one move only, which no contour follows; remove it"
-                raise CutterFault(text)
-            return []
-        assert self._cutter is not None
-        self._cutter.fix()
+        if self._first is not None and not self.started:
+            text = "radius compensation is on for one move only, which no contour follows; remove it"
+            raise CutterFault(text)
+        if self._cutter is not None:
+            self._cutter.fix()
         return list(self._written())
 
     @property

@@ -225,7 +225,10 @@ def dialect_of(words: Words, reading: Reading, *, prints: bool = False) -> str |
         only = frame is not None and not any(sign.search(text) for sign in _STATEMENTS)
         of_language = '"' not in text and (_LINUXCNC.search(text) or _FANUC.search(text))
         of_printer = prints and not of_language and is_command(words.row_text(row))
-        if not computes(text) or of_printer or (only and (prints or _not_read(frame, reading))):
+        # words that RS274NGC has not, or that the user leaves out
+        left_out = frame is not None and frame[0].replace("G0", "G") in reading.ignore
+        not_read = prints or left_out or reading.strict or reading.dialect not in (AUTO, FANUC)
+        if not computes(text) or of_printer or (only and not_read):
             continue
         if reading.dialect not in (AUTO, PRINTER):
             return reading.dialect
@@ -235,12 +238,6 @@ def dialect_of(words: Words, reading: Reading, *, prints: bool = False) -> str |
             found = FANUC
         found = found or LINUXCNC
     return found
-
-
-def _not_read(frame: re.Match[str] | None, reading: Reading) -> bool:
-    """True if a frame is a word that RS274NGC has not, or that the user leaves out."""
-    left_out = frame is not None and frame[0].replace("G0", "G") in reading.ignore
-    return left_out or reading.strict or reading.dialect not in (AUTO, FANUC)
 
 
 def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Machine | None) -> bool:
@@ -258,9 +255,9 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
     polar = (112.0, 113.0)  # of Haas' lathes; of mills they are work systems among others
     if all(len(words.find("G", code)) for code in polar) and not len(words.find("G", 110.0, 111.0, 114.0)):
         return True
-    if _has(words, "Y") or _has(words, "V"):
+    letters = _letters(words)
+    if letters & set("YV"):
         return False
-    letters = {chr(c) for c in np.unique(words.letter) if c}
     of_machine = set() if machine is None else {letter.upper() for letter in machine.axes}
     if letters >= set("XZ") and letters & (set("UW") - of_machine):
         return not letters & set(reading.ignore)
@@ -272,7 +269,7 @@ def is_turned(words: Words, dialect: str | None, reading: Reading, machine: Mach
 
 def has_two_axes(words: Words) -> bool:
     """True if a program has X and Z and no Y: it may be one for a lathe."""
-    return _has(words, "X") and _has(words, "Z") and not _has(words, "Y")
+    return _letters(words) & set("XYZ") == set("XZ")
 
 
 def _has_signs(words: Words) -> bool:
@@ -284,12 +281,11 @@ def _has_signs(words: Words) -> bool:
     G95, G7, G8), D beside G96, and G90, G91 or G94 without coordinates (G90 and G94 are cycles of system A)
     are of others.
     """
-    if _has(words, "J") or _rows_with(words, "M", _TOOL_CHANGE) or _rows_with(words, "G", *_OF_OTHERS):
-        return False
-    if any(not letters & set("XZUW") for letters in _rows_with(words, "G", *_CYCLES_OF_LATHES)):
+    if "J" in _letters(words) or _rows_with(words, "M", _TOOL_CHANGE) or _rows_with(words, "G", *_OF_OTHERS):
         return False
     fast = _rows_with(words, "G", _SURFACE_SPEED)
-    if any("D" in letters for letters in fast):
+    cycles = _rows_with(words, "G", *_CYCLES_OF_LATHES)
+    if any("D" in letters for letters in fast) or not all(letters & set("XZUW") for letters in cycles):
         return False
     if any("S" in letters for letters in (*fast, *_rows_with(words, "G", _SPEED_MAX))):
         return True
@@ -305,14 +301,14 @@ def _rows_with(words: Words, letter: str, *codes: float) -> list[set[str]]:
     return [{chr(c) for c in words.of_rows(row)[0]} for row in rows]
 
 
-def _has(words: Words, letter: str) -> bool:
-    return bool((words.letter == ord(letter)).any())
+def _letters(words: Words) -> set[str]:
+    return {chr(c) for c in np.unique(words.letter) if c}
 
 
 def is_fanuc(words: Words, dialect: str | None, reading: Reading) -> bool:
     """True if a program that computes nothing has a mark of Fanuc's and Haas' controls: G54.1 beside L words, or
     before its first move the number of a program (O1000), which LinuxCNC, grbl and printers do not have."""
-    if _has(words, "L") and len(words.find("G", 54.1)) > 0:
+    if "L" in _letters(words) and len(words.find("G", 54.1)) > 0:
         return True
     if dialect is not None or reading.dialect != AUTO or reading.strict:
         return False

@@ -52,18 +52,11 @@ def expand(
     if not found:
         stopped = run.start()
         found = [stopped] if stopped else []
-    faults = [
-        files.sources[f.place.file].fault(f, run.files[f.place.file] if f.place.file else "") for f in found
-    ]
-    program = dataclasses.replace(
-        interpreter.program(run.frames),
-        expansion=Expansion(
-            dialect=FANUC if dialect == LATHE else dialect,
-            calls=tuple(run.calls.items()),
-            turns=run.turns,
-            rows=run.executed,
-        ),
-    )
+    names = ["", *run.files[1:]]
+    faults = [files.sources[f.place.file].fault(f, names[f.place.file]) for f in found]
+    calls, dialect = tuple(run.calls.items()), FANUC if dialect == LATHE else dialect
+    expansion = Expansion(dialect=dialect, calls=calls, turns=run.turns, rows=run.executed)
+    program = dataclasses.replace(interpreter.program(run.frames), expansion=expansion)
     return program, [*faults, *interpreter.faults()]
 
 
@@ -131,8 +124,7 @@ class _Files:
 
 @contextlib.contextmanager
 def _garbage_waits() -> Iterator[None]:
-    """Within, Python looks for no garbage: statements are none, and it would go through all of them again
-    and again."""
+    """Python looks for no garbage within: it would go through all statements again and again."""
     before = gc.isenabled()
     gc.disable()
     try:

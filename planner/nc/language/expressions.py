@@ -153,12 +153,8 @@ class Expressions:
 
     def stored(self, index: float) -> bool:
         """True if a parameter of that number is the program's own, not one that the control is asked for."""
-        low = 0 if self.language.vacant is None else 1
-        return (
-            index == int(index)
-            and low <= index <= self.language.largest
-            and index not in self.language.system_numbers
-        )
+        low, language = 0 if self.language.vacant is None else 1, self.language
+        return low <= index <= language.largest and index % 1 == 0 and index not in language.system_numbers
 
     def _expression(self, expression: tree.Expression, *, raw: bool) -> tuple[str, bool]:
         """Python text, and whether it is true or false rather than a number."""

@@ -21,6 +21,7 @@ from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.approach import ContourWay
 from planner.nc.language.making import TAPPED, Maker, Making, Row, around
+from planner.nc.language.travel import FRAME_CHANGES
 from planner.nc.language.travel_rows import STANDS, TravelRow, turned
 from planner.nc.language.tree import Expression, MadeRows, SourcePlace, made
 from planner.nc.program import Kind
@@ -70,10 +71,8 @@ def heidenhain_frame(making: Making, given: Given, *, cycle: int) -> Iterator[Ro
                 datum[axis] += given["I" + letter] * unit
         only_shifted = (parts.mirror * parts.scale == 1.0).all() and parts.rotation % 360.0 == 0.0
         if not only_shifted and datum.any():
-            raise ValueError(
-                "a datum shift while a rotation, mirror image or scale is in force is not read: in whose axes it counts is "
-                "not documented; define the shift first"
-            )
+            what = "a datum shift while a rotation, mirror image or scale is in force is not read"
+            raise ValueError(f"{what}: in whose axes it counts is not documented; define the shift first")
         parts.datum = datum
     elif cycle == 8:
         parts.mirror = np.array([-1.0 if letter in given else 1.0 for letter in AXES])
@@ -87,10 +86,9 @@ def heidenhain_frame(making: Making, given: Given, *, cycle: int) -> Iterator[Ro
         parts.centre = np.array([given.get("CC" + letter, 0.0) * unit for letter in AXES])
     uneven = len({*np.abs(parts.scale)}) > 1
     if parts.rotation % 360.0 and (uneven or (parts.mirror != 1.0).any()):
-        raise ValueError(
-            "a rotation (cycle 10) together with a mirror image (8) or a scale of single axes (26) is not read: "
-            "which acts first is not documented; let the CAM system write the moves out"
-        )
+        what = "a rotation (cycle 10) together with a mirror image (8) or a scale of single axes (26) is not read"
+        why = "which acts first is not documented; let the CAM system write the moves out"
+        raise ValueError(f"{what}: {why}")
     making.travel.programmed = parts.affine()
     return _in_force(making)
 
@@ -99,16 +97,14 @@ def _in_force(making: Making) -> Iterator[Row]:
     """The programmed frame holds from here on; G52 where it is a shift alone. Raises ValueError."""
     matrix, shift = making.travel.programmed
     if making.travel.compensated:
-        text = "the frame changes while cutter radius compensation is on; switch it off before (R0, G40)"
-        raise ValueError(text)
+        raise ValueError(FRAME_CHANGES)
     if not making.travel.tilted:
         values = shift / making.unit if (matrix == np.eye(3)).all() else np.zeros(3)
         yield [("G", 52.0), *zip(AXES, values.tolist(), strict=True)]
         making.flush()
     elif making.interpreter.state.g92.any():
-        raise ValueError(
-            "a shift in a tilted plane on top of one before the plane is not read; end the plane, or the shift, first"
-        )
+        what = "a shift in a tilted plane on top of one before the plane"
+        raise ValueError(f"{what} is not read; end the plane, or the shift, first")
     set_frame(making)
 
 
@@ -203,9 +199,8 @@ def _arc(making: Making, given: Given, centre: complex, left: bool) -> list[Row]
 def _in_its_plane(making: Making, given: Given, behind: str = "") -> complex:
     """The point in the plane of X Y Z, or of these with something `behind` them [programmed units]."""
     here = zip(AXES, making.here(), strict=True)
-    return in_plane(
-        np.array([given.get(letter + behind, at) for letter, at in here]), making.interpreter.state.normal
-    )
+    point = np.array([given.get(letter + behind, at) for letter, at in here])
+    return in_plane(point, making.interpreter.state.normal)
 
 
 def tangent_arc(making: Making, given: Given) -> Iterable[Row]:

@@ -98,9 +98,8 @@ class Making:
         """Radius of the loaded tool in the program's unit. Raises ValueError where it is not known."""
         found = self.travel.radius()
         if found == 0.0:
-            number = self.interpreter.state.tool_loaded
-            needed = f"the diameter of tool {number}; write it into [tools] of the machine file"
-            raise ValueError(f"the cycle needs {needed}")
+            tool = f"the diameter of tool {self.interpreter.state.tool_loaded}"
+            raise ValueError(f"the cycle needs {tool}; write it into [tools] of the machine file")
         return found / self.unit
 
     def assume(self, text: str) -> None:
@@ -141,10 +140,7 @@ def equal_steps(whole: float, step_max: float) -> int:
 @dataclass(frozen=True)
 class HolePlan:
     """A hole at the present place: z of the clearance, the surface, the bottom and the end; the feed; dwell
-    at the bottom [s].
-
-    Raises ValueError if the bottom is not below the surface.
-    """
+    at the bottom [s]. Raises ValueError if the bottom is not below the surface."""
 
     clear: float
     top: float
@@ -168,7 +164,7 @@ def coarse_lead(size: float, unit: float) -> float:
 
 def go(z: float, feed: float | None = None) -> Row:
     """To z, at a feed or at rapid speed."""
-    return [("G", 0.0), ("Z", z)] if feed is None else [("G", 1.0), ("F", feed), ("Z", z)]
+    return [("G", 0.0), ("Z", z)] if feed is None else feed_to(z, feed)
 
 
 def left(hole: HolePlan) -> Iterator[Row]:

@@ -134,15 +134,13 @@ def loops(shape: PocketShape, outermost: float, step: float, turning: int) -> li
     """
     width = shape.room - outermost
     if width < -_SHORT * shape.room:
-        raise ValueError(
-            f"the pocket leaves room for a tool of radius {shape.room:.6g} mm less its allowance; the tool is larger"
-        )
+        room = f"the pocket leaves room for a tool of radius {shape.room:.6g} mm less its allowance"
+        raise ValueError(f"{room}; the tool is larger")
     if width <= _SHORT * shape.room:
         return [shape.core()]
     count = max(1, math.ceil(width / step - _SHORT))
-    found = [shape.core()]
-    found += [shape.loop(outermost + k * width / count, turning) for k in range(count - 1, -1, -1)]
-    return found
+    insets = (outermost + k * width / count for k in range(count - 1, -1, -1))
+    return [shape.core(), *(shape.loop(inset, turning) for inset in insets)]
 
 
 @dataclass(frozen=True)

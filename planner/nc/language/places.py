@@ -3,13 +3,14 @@ cycles, and the point on the way of G28."""
 
 import cmath
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc import codes
-from planner.nc.arcs import IN_PLANE, at_place, in_plane
+from planner.nc.arcs import IN_PLANE, Arc, ArcWay, arc_from_centre, arc_from_radius, at_place, in_plane
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.travel_rows import (
     AXES,
@@ -17,7 +18,7 @@ from planner.nc.language.travel_rows import (
     RADIUS,
     STANDS,
     TURNS,
-    Coordinates,
+    FrameParts,
     G,
     TravelRow,
     tilted_rows,
@@ -25,18 +26,27 @@ from planner.nc.language.travel_rows import (
 )
 
 CYCLES = frozenset(code / 10 for code in codes.CYCLES)
+_EVEN = 1e-9  # relative error of a frame that still counts as even
 _ZEROS = frozenset((43.0, 49.0, *(float(code) for code in range(54, 60))))  # beside coordinates
 
 
-class Places(Coordinates):
-    """The place of the program in its frame.
+class Places:
+    """The place of the program in its frame, where a point p of it is at matrix p + shift; lengths in mm.
 
-    place    : (3,) the programmed position [mm]
-    absolute : G90 is in force
+    matrix, shift : (3, 3) and (3,)
+    programmed    : the frame as the program has it; a shift alone is a G52 and not in `matrix` and `shift`
+    parts         : of a conversational program's frame
+    normal        : axis normal to the plane
+    polar         : pole in the plane about which coordinates are a radius and an angle (G16), or None
+    place         : (3,) the programmed position
+    absolute      : G90 is in force
     """
 
     def __init__(self, interpreter: Interpreter):
-        super().__init__()
+        self.matrix, self.shift = np.eye(3), np.zeros(3)
+        self.programmed = np.eye(3), np.zeros(3)
+        self.parts, self.normal = FrameParts(), 2
+        self.polar: complex | None = None
         self.interpreter = interpreter
         self.place, self.absolute = np.zeros(3), True
         self._angle = 0.0  # of polar coordinates [degrees]
@@ -44,6 +54,69 @@ class Places(Coordinates):
         # the tilted plane in force, and with it frames that tilt; where rows have come to in it
         self.swivelled = self._tilt = np.eye(3), np.zeros(3)
         self._flat = np.zeros(3)
+
+    @property
+    def is_plain(self) -> bool:
+        """True if the program's points are those of the work system."""
+        return self.polar is None and not self.shift.any() and bool((self.matrix == np.eye(3)).all())
+
+    @property
+    def mirrored(self) -> bool:
+        """True if the frame mirrors the plane."""
+        return self._plane_size < 0.0
+
+    def scale(self) -> float:
+        """By what the frame multiplies lengths in the plane. Raises ValueError where it does so unevenly."""
+        self.check_even()
+        return math.sqrt(abs(self._plane_size))
+
+    def mapped(self, point: FloatArray) -> FloatArray:
+        """(3,) where a point (3,) of the program is."""
+        return self.matrix @ point + self.shift
+
+    def unmapped(self, point: FloatArray) -> FloatArray:
+        """(3,) the point of the program that is there."""
+        return np.asarray(np.linalg.solve(self.matrix, point - self.shift), dtype=np.float64)
+
+    def _out_of_plane(self, matrix: FloatArray) -> bool:
+        """True if a matrix (3, 3) turns the plane out of itself."""
+        plane, normal = list(IN_PLANE[self.normal]), self.normal
+        return bool(matrix[normal, plane].any() or matrix[plane, normal].any())
+
+    def check_even(self) -> None:
+        """Arcs stay arcs. Raises ValueError."""
+        plane, normal = list(IN_PLANE[self.normal]), self.normal
+        inner = self.matrix[np.ix_(plane, plane)]
+        size = abs(self._plane_size)
+        off = max(abs(inner.T @ inner - size * np.eye(2)).max(), abs(self.matrix[normal, plane]).max())
+        if max(off, abs(self.matrix[plane, normal]).max()) > _EVEN * max(size, 1.0):
+            raise ValueError(
+                "an arc whose plane the frame scales unevenly, or turns out of itself, is no arc"
+            )
+
+    def arc(
+        self, start: FloatArray, end: FloatArray, given: Mapping[int, float], clockwise: bool, unit: float
+    ) -> Arc:
+        """The arc of a row in the work system. Raises ValueError for one that does not close.
+
+        start, end : (3,) in the program's coordinates
+        given      : lengths and turns by letter code
+        """
+        self.check_even()
+        if RADIUS not in given and not set(CENTRES) & set(given):
+            raise ValueError("an arc needs a centre or a radius")
+        way = ArcWay(self.normal, clockwise, round(given.get(TURNS, 1.0)), unit)
+        if RADIUS in given:
+            arc = arc_from_radius(start, end, given[RADIUS], way)
+        else:
+            centre = start + np.array([given.get(letter, 0.0) for letter in CENTRES])
+            arc = arc_from_centre(start, end, centre, way)
+        return Arc(self.mapped(arc.centre), -arc.sweep if self.mirrored else arc.sweep)
+
+    @property
+    def _plane_size(self) -> float:
+        plane = list(IN_PLANE[self.normal])
+        return float(np.linalg.det(self.matrix[np.ix_(plane, plane)]))
 
     @property
     def _unit(self) -> float:
@@ -141,9 +214,8 @@ class Places(Coordinates):
         if self._unit == 1.0 and not self.interpreter.state.diameters:
             return row
         lengths = {*AXES, *CENTRES}
-        return replace(
-            row, words=[(c, v * self._per_mm(c) if c in lengths else v, at) for c, v, at in row.words]
-        )
+        words = [(c, v * self._per_mm(c) if c in lengths else v, at) for c, v, at in row.words]
+        return replace(row, words=words)
 
     def _parts(self, row: TravelRow) -> list[TravelRow]:
         """The row, in two where the frame maps its coordinates and another code moves their zero."""

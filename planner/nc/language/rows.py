@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.nc.language.tree import ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 
 RowWord = tuple[int, int, float | None]  # letter code, place, value
@@ -41,9 +42,8 @@ class AppendedRows:
         self.frames: list[tuple[int, int]] = [(0, 0)]
         self.data = b""
         self.files: list[tuple[int, str]] = []
-        self._parts: list[
-            tuple[Array, ...]
-        ] = []  # letters, values, places, computed or not; lines, and how many words they have
+        # letters, values, places, computed or not; lines, and how many words they have
+        self._parts: list[tuple[Array, ...]] = []
         self._rows = 0
         self._entries: list[tuple[int, int]] = []
         self._new: list[tuple[int, Sequence[RowWord]]] = []  # rows that are not in arrays yet: line, words
@@ -94,11 +94,12 @@ class AppendedRows:
         self.values.clear()
         self.frames[:] = self.frames[-1:]
         self.frames[0] = (0, self.frames[0][1])
-        infinite = np.flatnonzero(np.isinf(value))
-        if len(infinite):
+        if len(infinite := np.flatnonzero(np.isinf(value))):
             word = int(infinite[0])
-            row = int(np.searchsorted(np.cumsum(length), word, side="right"))
-            raise NotFinite(int(at[word]), int(tables.line[rows[row]]), chr(letter[word]))
+            line = int(tables.line[rows[np.searchsorted(np.cumsum(length), word, side="right")]])
+            file = sum(begin <= at[word] for begin, _ in self.files)
+            text = f"the computed {chr(letter[word])} word is infinite"
+            raise NotFinite(SourcePlace(file, line, int(at[word])), text)
         has_value = ~np.isnan(value)
         if not has_value.all():
             length = np.add.reduceat(np.append(has_value, False), np.cumsum(length) - length) * (length > 0)
@@ -122,14 +123,10 @@ class AppendedRows:
     def _settle(self) -> None:
         if not self._new:
             return
-        words = [word for _, row in self._new for word in row]
-        self._append(
-            np.array([word[0] for word in words], dtype=np.uint8),
-            np.array([word[2] for word in words], dtype=np.float64),  # None becomes NaN
-            np.array([word[1] for word in words], dtype=np.int64),
-            np.array([line for line, _ in self._new], dtype=np.int32),
-            np.array([len(row) for _, row in self._new], dtype=np.int64),
-        )
+        letter, at, value = zip(*(word for _, row in self._new for word in row), strict=True)
+        lines, count = zip(*((line, len(row)) for line, row in self._new), strict=True)
+        words = np.array(letter, np.uint8), np.array(value, np.float64), np.array(at, np.int64)  # None: NaN
+        self._append(*words, np.array(lines, np.int32), np.array(count, np.int64))
         self._new.clear()
 
     def _tables_now(self) -> _Tables:
@@ -143,12 +140,8 @@ class AppendedRows:
         return self._tables
 
 
-class NotFinite(Exception):
-    """A computed word is infinite; where it stands."""
-
-    def __init__(self, at: int, line: int, letter: str):
-        super().__init__(letter)
-        self.at, self.line, self.letter = at, line, letter
+class NotFinite(ProgramFault):
+    """A computed word is infinite."""
 
 
 def _ranges(first: Array, last: Array) -> tuple[Array, Array]:

@@ -6,13 +6,12 @@ direction and the side of compensation change. Rows come out absolute (G90), wit
 the expanded program needs neither frames nor compensation. With none in force rows pass as they are.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from planner.nc.arcs import IN_PLANE
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.approach import Approach
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
 from planner.nc.language.places import CYCLES, Places
 from planner.nc.language.travel_rows import (
@@ -61,7 +60,8 @@ class RowsThrough(Places):
         self._mapped = np.zeros(3)  # `place` in the work system
         self._beside = False  # the tool is not at `place`: compensation has just ended
         self._offset: OffsetMoves | None = None
-        self._approach: Approach | None = None
+        # APPR, waiting for the first move of its contour
+        self._approach: Callable[[Move], tuple[list[TravelRow], OffsetMoves | None]] | None = None
         self._coming: CornerMove | None = None  # of the next move
         self._corner: CornerMove | None = None  # of the last move, which waits for the next one
         self._between: list[TravelRow] = []  # rows without a move behind it
@@ -184,27 +184,23 @@ class RowsThrough(Places):
     def _pass(self, row: TravelRow, out: list[TravelRow], *, last: bool) -> None:
         if last and self._approach is not None:
             raise ValueError("APPR is followed by no contour")
-        if self._corner is not None:
-            if last:
-                self._no_corner(out)
-            else:
-                self._between.append(row)
-                return
-        if self._offset is None:
-            out.append(row)
+        if self._corner is not None and not last:
+            self._between.append(row)
             return
-        if last:
+        if self._corner is not None:
+            self._no_corner(out)
+        if self._offset is not None and not last:
+            out += [self._in_units(one) for one in self._offset.pass_row(row)]
+            return
+        if self._offset is not None:
             self._leave()
             out += self._taken()
-            out.append(row)
-            return
-        out += [self._in_units(one) for one in self._offset.pass_row(row)]
+        out.append(row)
 
     def _move(self, row: TravelRow, out: list[TravelRow]) -> None:
         if self.motion < 0:
-            raise ValueError(
-                "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it"
-            )
+            text = "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it"
+            raise ValueError(text)
         given = self._lengths(row.words)
         target = self._target(given)
         mapped, arc = self.mapped(target), None
@@ -242,7 +238,7 @@ class RowsThrough(Places):
     def _go(self, move: Move, out: list[TravelRow]) -> None:
         rows: list[TravelRow] = []
         if self._approach is not None:
-            rows, self._offset = self._approach.rows(move)
+            rows, self._offset = self._approach(move)
             self._approach = None
         rows += move.rows(self.normal) if self._offset is None else self._offset.move(move)
         out += [self._in_units(one) for one in rows]
@@ -253,8 +249,8 @@ class RowsThrough(Places):
         if waits is None:
             return
         if not waits.modal:
-            text = f"the rounding or chamfer of line {waits.line} needs a move in the plane before and behind"
-            raise ValueError(text)
+            what = f"the rounding or chamfer of line {waits.line}"
+            raise ValueError(f"{what} needs a move in the plane before and behind")
         first, self._corner, self._coming = waits.first, None, None
         waiting, self._between = self._between, []
         rows: list[TravelRow] = []

@@ -16,7 +16,7 @@ from typing import Any
 
 from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.compiled import Compiled, Endless, last_statement, sentence, statement_of, whole
+from planner.nc.language.compiled import Compiled, endless, last_statement, sentence, statement_of, whole
 from planner.nc.language.making import Maker, Making
 from planner.nc.language.rows import AppendedRows, NotFinite
 from planner.nc.language.source import Source
@@ -113,12 +113,10 @@ class ProgramRun:
                 self._execute(words_of(left, self.rows.data, tuple(self.rows.files)))
         except Ended:
             return None
+        except NotFinite as fault:
+            return fault
         except ProgramFault as fault:
             return self._stopped(fault)
-        except NotFinite as fault:
-            file = sum(begin <= fault.at for begin, _ in self.rows.files)
-            place = SourcePlace(file, fault.line, fault.at)
-            return ProgramFault(place, f"the computed {fault.letter} word is infinite")
         except (ArithmeticError, ValueError, KeyError) as fault:
             return self._stopped(ProgramFault(statement_of(fault.__traceback__, self.units), sentence(fault)))
         return None
@@ -148,9 +146,9 @@ class ProgramRun:
         self.interpreter.execute(words)
 
     def tick(self) -> None:
-        """Raise Endless if the program has passed a limit; execute what is pending once that is long."""
+        """Execute what is pending once that is long. Raises ValueError if the program has passed a limit."""
         if self.turns > TURNS_MAX:
-            raise Endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
+            raise endless(f"{TURNS_MAX:,} turns of loops, jumps and calls")
         pending = len(self.rows.pending)
         if pending > self._at_once:
             blocks = self.interpreter.table.blocks + self.travel.moves
@@ -159,11 +157,11 @@ class ProgramRun:
             self.idle = 0 if moved else self.idle + pending
             self._at_once = min(2 * self._at_once, ROWS_AT_ONCE) if moved else IDLE_AT_ONCE
             if self.idle > IDLE_MAX:
-                raise Endless(f"{self.idle:,} lines executed without a move")
+                raise endless(f"{self.idle:,} lines executed without a move")
             if self.interpreter.by_word > BY_WORD_MAX:
-                raise Endless(f"{BY_WORD_MAX:,} lines that are no plain straight moves")
+                raise endless(f"{BY_WORD_MAX:,} lines that are no plain straight moves")
         if self.executed + pending > ROWS_MAX:
-            raise Endless(f"{ROWS_MAX:,} lines executed")
+            raise endless(f"{ROWS_MAX:,} lines executed")
 
     def call(
         self,
@@ -300,7 +298,7 @@ class ProgramRun:
         known = self._known_frames.get(key)
         if known is None:
             if len(self.frames) >= FRAMES_MAX:
-                raise Endless(f"{FRAMES_MAX:,} different chains of calls")
+                raise endless(f"{FRAMES_MAX:,} different chains of calls")
             known = self._known_frames[key] = len(self.frames)
             file = self.units[self.functions[name].__code__.co_filename].places[0].file
             self.frames.append(Frame(name=name, source=self.files[file], line=place[1], caller=self._frame))
@@ -315,6 +313,6 @@ class ProgramRun:
                 message += " ..."
                 break
             frame = self.frames[frame].caller
-        with contextlib.suppress(Ended, NotFinite, ProgramFault):
+        with contextlib.suppress(Ended, ProgramFault):
             self.flush()
         return ProgramFault(fault.place, message)

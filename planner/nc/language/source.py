@@ -112,15 +112,10 @@ class Source:
         words = self.words
         letter, value = words.of_rows(first, last)
         ends = (letter == ord("%")) | ((letter == ord("M")) & np.isin(value, (2, 30)))
-        at = np.flatnonzero(ends) + int(words.first[first])
-        runs: list[PlainRows] = []
-        begin = first
-        for row in words.rows_with(at):
-            runs.append(self._run(begin, row + 1, may_end=True))
-            begin = row + 1
-        if begin < last:
-            runs.append(self._run(begin, last, may_end=False))
-        return runs
+        rows = words.rows_with(np.flatnonzero(ends) + int(words.first[first]))
+        begins = [first, *(row + 1 for row in rows)]
+        runs = [self._run(k, row + 1, may_end=True) for k, row in zip(begins[:-1], rows, strict=True)]
+        return [*runs, *([self._run(begins[-1], last, may_end=False)] if begins[-1] < last else [])]
 
     def words_of(self, rows: PlainRows) -> tuple[Array, FloatArray]:
         """Letters (n,) and values (n,) of rows."""
@@ -162,8 +157,7 @@ class LineParser:
     def begin(self, opened: tree.OpenStatement) -> tree.OpenStatement:
         """Open a statement, in whose body the next ones go. Raises ProgramFault for too many in each other."""
         if len(self.open) >= NESTED_MAX:
-            text = f"more than {NESTED_MAX} loops and branches in each other"
-            raise ProgramFault(opened.place, text)
+            raise ProgramFault(opened.place, f"more than {NESTED_MAX} loops and branches in each other")
         self.open.append(opened)
         self.body = opened.body
         return opened

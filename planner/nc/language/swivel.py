@@ -39,10 +39,8 @@ def siemens(making: Making, given: Mapping[str, float]) -> None:
     angles = [given.get(f"p{k}", 0.0) for k in (7, 8, 9)]
     before, behind = (np.array([given.get(f"p{k}", 0.0) for k in part]) for part in ((4, 5, 6), (10, 11, 12)))
     if any(angles) and mode >> 6:
-        raise ValueError(
-            f"MODE {mode} of CYCLE800, angles of the rotary axes, solid or projection angles, is not read; write angles axis by "
-            "axis (MODE 57 or 27)"
-        )
+        what = f"MODE {mode} of CYCLE800, angles of the rotary axes, solid or projection angles, is not read"
+        raise ValueError(f"{what}; write angles axis by axis (MODE 57 or 27)")
     if round(given.get("p2", 0.0)) % 10 == 1:
         raise ValueError("ST 1 of CYCLE800, a plane on another one, is not read; write its angles from zero")
     if given.get("p0", 0.0) and len(given) > 1:
@@ -98,9 +96,8 @@ def _no_frame(making: Making, matrix: FloatArray, shift: FloatArray, *, turned_o
     frame, moved = making.travel.programmed
     framed = (frame != np.eye(3)).any() or (bool(moved.any()) and not turned_only)
     if framed and (shift.any() or (matrix != np.eye(3)).any()):
-        raise ValueError(
-            "a tilted plane while a frame (shift, rotation, mirror image, scale) is in force is not read; end that first"
-        )
+        what = "a tilted plane while a frame (shift, rotation, mirror image, scale) is in force"
+        raise ValueError(f"{what} is not read; end that first")
 
 
 def tilt(making: Making, matrix: FloatArray, shift: FloatArray, way: int, side: int) -> None:
@@ -113,10 +110,8 @@ def tilt(making: Making, matrix: FloatArray, shift: FloatArray, way: int, side: 
     state, chain, direction = interpreter.state, interpreter.tool_point.chain, matrix[:, 2]
     level = bool(abs(direction - np.array([0.0, 0.0, 1.0])).max() < _SAME)
     if chain is None and not level:
-        raise ValueError(
-            "a tilted plane turns the rotary axes of the machine, and its file has no table [kinematics]; add it (type, rotary "
-            "axes and their offsets)"
-        )
+        what = "a tilted plane turns the rotary axes of the machine, and its file has no table [kinematics]"
+        raise ValueError(f"{what}; add it (type, rotary axes and their offsets)")
     travel.swivel(np.eye(3), np.zeros(3))
     if chain is None:
         travel.swivel(matrix, shift)

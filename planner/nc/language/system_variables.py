@@ -119,20 +119,14 @@ class SystemVariables:
             [*(("G", code) for code in (*codes, system, 98.0 if state.to_level else 99.0)), *path],
             [("G", _FEED_MODES[state.feed_mode])],
         ]
-        if state.tool_offset.any():
-            lengths = zip("XYZ", (state.tool_offset[:3] / state.unit).tolist(), strict=True)
-            rows.append([("G", 43.1), *(pair for pair in lengths if pair[1])])
-        else:
-            rows.append([("G", 49.0)])
+        lengths = zip("XYZ", (state.tool_offset[:3] / state.unit).tolist(), strict=True)
+        offset = state.tool_offset.any()
+        rows.append([("G", 43.1), *(pair for pair in lengths if pair[1])] if offset else [("G", 49.0)])
         if state.feed > 0 and state.feed_mode == "per minute":
             rows.append([("F", self.feed())])
-        speed = self.event("S")
-        if speed is not None:
-            rows.append([("S", speed)])
-        for group in ((3.0, 4.0, 5.0), (7.0, 8.0, 9.0), (48.0, 49.0)):
-            code = self.event("M", group)
-            if code is not None:
-                rows.append([("M", code)])
+        events = [("S", ()), ("M", (3.0, 4.0, 5.0)), ("M", (7.0, 8.0, 9.0)), ("M", (48.0, 49.0))]
+        last = ((letter, self.event(letter, group)) for letter, group in events)
+        rows += [[(letter, value)] for letter, value in last if value is not None]
         return tuple(tuple(row) for row in rows)
 
 
@@ -181,13 +175,12 @@ _LINUXCNC_NAMES: dict[str, Callable[[State, SystemVariables], float]] = {
 def _linuxcnc_number(system: SystemVariables, number: int) -> float:
     state = system.interpreter.state
     tool, none = state.tools.get(state.tool_loaded), state.zeros()
-    places = {
-        5161: state.homes.get(280, none),
-        5181: state.homes.get(300, none),
+    homes = {5161: state.homes.get(280, none), 5181: state.homes.get(300, none)}
+    for first, place in {
+        **homes,
         5211: state.g92,
         5401: state.tool_offset,
-    }
-    for first, place in places.items():  # x, y, z; the other axes are 0
+    }.items():  # others than x y z are 0
         if first <= number < first + 3:
             return float(place[number - first])
     if 5221 <= number < 5221 + _OF_ONE * len(SYSTEMS):
@@ -237,7 +230,7 @@ class FanucVariables(SystemVariables):
     def get(self, parameter: int | str, depth: int) -> float:
         """A parameter by its number, `depth` calls open. Raises ValueError for what is not known."""
         assert isinstance(parameter, int)
-        state, number = self.interpreter.state, parameter
+        state, cutter, number = self.interpreter.state, self.interpreter.mover.cutter, parameter
         parts = FrameParts() if self.travel is None else self.travel.parts
         if 4201 <= number <= 4330:
             number -= 200
@@ -248,7 +241,7 @@ class FanucVariables(SystemVariables):
             4005: lambda: _FEED_MODES[state.feed_mode],
             4006: lambda: 21.0 if state.unit == 1.0 else 20.0,
             4004: lambda: 23.0,
-            4007: lambda: self._compensation(),
+            4007: lambda: 40.0 if cutter is None else 41.0 if cutter.sign > 0 else 42.0,
             4008: lambda: 43.0 if state.tool_offset.any() else 49.0,
             4010: lambda: 98.0 if state.to_level else 99.0,
             4011: lambda: 50.0 + (parts.scale != 1.0).any(),
@@ -294,10 +287,6 @@ class FanucVariables(SystemVariables):
         origin[axis] = (value or 0.0) * state.unit
         state.systems[system] = System(origin, old.rotation)
         state.apply_offsets()
-
-    def _compensation(self) -> float:
-        cutter = self.interpreter.mover.cutter
-        return 40.0 if cutter is None else 41.0 if cutter.sign > 0 else 42.0
 
 
 def _work_offset(number: int) -> tuple[int, int] | None:

@@ -2,14 +2,17 @@
 compensation, corners."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.nc.language.approach import Approach, ContourWay
+from planner.nc.language.approach import ContourWay
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
 from planner.nc.language.rows_through import RowsThrough
 from planner.nc.state import tool_name
+
+FRAME_CHANGES = "the frame changes while cutter radius compensation is on; switch it off before (R0, G40)"
 
 
 class Travel(RowsThrough):
@@ -36,7 +39,7 @@ class Travel(RowsThrough):
         """Points are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises ValueError."""
         self._no_corner()
         if self.compensated:
-            raise ValueError("the frame changes while cutter radius compensation is on; switch it off before")
+            raise ValueError(FRAME_CHANGES.removesuffix(" (R0, G40)"))
         self._begin()
         out = self._out_of_plane(matrix)
         whole, there = self.swivelled[0] @ matrix, self.swivelled[0] @ shift + self.swivelled[1]
@@ -73,24 +76,19 @@ class Travel(RowsThrough):
         side = -side if self.mirrored else side
         if self._approach is not None:
             return
-        if self._offset is not None:
-            if self._offset.side != side:
-                text = "the side of compensation changes between two moves; switch it off before (R0, G40)"
-                raise ValueError(text)
-            return
-        radius = self._known_radius(assume)
-        if radius == 0.0:
-            return
-        self._begin()
-        self._offset = OffsetMoves(self._mapped, radius, side, self.normal)
+        if self._offset is not None and self._offset.side != side:
+            text = "the side of compensation changes between two moves; switch it off before (R0, G40)"
+            raise ValueError(text)
+        if self._offset is None and (radius := self._known_radius(assume)):
+            self._begin()
+            self._offset = OffsetMoves(self._mapped, radius, side, self.normal)
 
     def _known_radius(self, assume: Callable[[str], None]) -> float:
         """Radius of the tool that compensates [mm]; where it is 0 that is said."""
         radius = self.radius()
         if radius == 0.0:
-            tool = tool_name(self.interpreter.state.tool_loaded)
-            text = "has no diameter in the machine file: radius compensation does not move the path"
-            assume(f"{tool} {text}")
+            what = f"{tool_name(self.interpreter.state.tool_loaded)} has no diameter in the machine file"
+            assume(f"{what}: radius compensation does not move the path")
         return radius
 
     def approach(self, way: ContourWay, first: FloatArray, side: int, assume: Callable[[str], None]) -> None:
@@ -104,7 +102,8 @@ class Travel(RowsThrough):
         radius = self._known_radius(assume) if side else 0.0
         side = (side or -1) * (-1 if self.mirrored else 1)
         mapped = self.mapped(first)
-        self._approach = Approach(way, self._mapped.copy(), mapped, min(self.motion, 1), radius, side)
+        motion = min(self.motion, 1)
+        self._approach = partial(way.approach, self._mapped.copy(), mapped, motion, radius, side)
         self.place, self._mapped, self.lost = first.copy(), mapped.copy(), True
 
     def corner(self, kind: str, size: float, line: int, *, modal: bool = False) -> None:

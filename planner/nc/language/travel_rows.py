@@ -1,9 +1,8 @@
-"""Rows of words on their way to the interpreter, the moves that they say, in mm, and the frame that maps
-these and their arcs."""
+"""Rows of words on their way to the interpreter, the moves that they say, in mm, and the parts of a frame."""
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +14,6 @@ from planner.nc.arcs import (
     Arc,
     ArcWay,
     arc_from_centre,
-    arc_from_radius,
     at_place,
     in_plane,
 )
@@ -26,14 +24,10 @@ G, M = ord("G"), ord("M")
 AXES, CENTRES = (ord("X"), ord("Y"), ord("Z")), (ord("I"), ord("J"), ord("K"))
 TURNS, RADIUS = ord("P"), ord("R")
 ROTARY = (ord("A"), ord("B"), ord("C"))
-_KNOT, _PIECE, _PIECE_OF_HELIX = (
-    ord("K"),
-    math.pi / 2.0,
-    math.pi / 36.0,
-)  # most of an arc in a piece of a curve
+_KNOT = ord("K")
+_PIECE, _PIECE_OF_HELIX = math.pi / 2.0, math.pi / 36.0  # most of an arc in a piece of a curve
 STANDS = 1e-9  # a move that is shorter stays where it is [mm]
 STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)  # M codes that act after the moves of their row
-_EVEN = 1e-9  # relative error of a frame that still counts as even
 
 
 @dataclass
@@ -218,88 +212,7 @@ class FrameParts:
 
 def turned(degrees: float, axis: int) -> FloatArray:
     """The matrix (3, 3) of a rotation about an axis."""
-    quarter = System(np.zeros(3), degrees)
-    plane = quarter.turn(np.array([1.0, 0.0, 0.0])), quarter.turn(np.array([0.0, 1.0, 0.0]))
-    a, b = ((1, 2), (2, 0), (0, 1))[axis]
+    about_z, pair = System(np.zeros(3), degrees), ((1, 2), (2, 0), (0, 1))[axis]
     matrix = np.eye(3)
-    matrix[np.ix_([a, b], [a, b])] = np.array([plane[0][:2], plane[1][:2]]).T
+    matrix[np.ix_(pair, pair)] = np.array([about_z.turn(np.eye(3)[k])[:2] for k in (0, 1)]).T
     return matrix
-
-
-class Coordinates:
-    """A point p of the program is at matrix p + shift; lengths in mm.
-
-    matrix, shift : (3, 3) and (3,)
-    programmed    : the frame as the program has it; a shift alone is a G52 and not in `matrix` and `shift`
-    parts         : of a conversational program's frame
-    normal        : axis normal to the plane
-    polar         : pole in the plane about which coordinates are a radius and an angle (G16), or None
-    """
-
-    def __init__(self) -> None:
-        self.matrix, self.shift = np.eye(3), np.zeros(3)
-        self.programmed = np.eye(3), np.zeros(3)
-        self.parts = FrameParts()
-        self.normal = 2
-        self.polar: complex | None = None
-
-    @property
-    def is_plain(self) -> bool:
-        """True if the program's points are those of the work system."""
-        return self.polar is None and not self.shift.any() and bool((self.matrix == np.eye(3)).all())
-
-    @property
-    def mirrored(self) -> bool:
-        """True if the frame mirrors the plane."""
-        return self._plane_size() < 0.0
-
-    def scale(self) -> float:
-        """By what the frame multiplies lengths in the plane. Raises ValueError where it does so unevenly."""
-        self.check_even()
-        return math.sqrt(abs(self._plane_size()))
-
-    def mapped(self, point: FloatArray) -> FloatArray:
-        """(3,) where a point (3,) of the program is."""
-        return self.matrix @ point + self.shift
-
-    def unmapped(self, point: FloatArray) -> FloatArray:
-        """(3,) the point of the program that is there."""
-        return np.asarray(np.linalg.solve(self.matrix, point - self.shift), dtype=np.float64)
-
-    def _out_of_plane(self, matrix: FloatArray) -> bool:
-        """True if a matrix (3, 3) turns the plane out of itself."""
-        plane, normal = list(IN_PLANE[self.normal]), self.normal
-        return bool(matrix[normal, plane].any() or matrix[plane, normal].any())
-
-    def check_even(self) -> None:
-        """Arcs stay arcs. Raises ValueError."""
-        plane, normal = list(IN_PLANE[self.normal]), self.normal
-        inner = self.matrix[np.ix_(plane, plane)]
-        size = abs(self._plane_size())
-        off = max(abs(inner.T @ inner - size * np.eye(2)).max(), abs(self.matrix[normal, plane]).max())
-        if max(off, abs(self.matrix[plane, normal]).max()) > _EVEN * max(size, 1.0):
-            text = "an arc whose plane the frame scales unevenly, or turns out of itself, is no arc"
-            raise ValueError(text)
-
-    def arc(
-        self, start: FloatArray, end: FloatArray, given: Mapping[int, float], clockwise: bool, unit: float
-    ) -> Arc:
-        """The arc of a row in the work system. Raises ValueError for one that does not close.
-
-        start, end : (3,) in the program's coordinates
-        given      : lengths and turns by letter code
-        """
-        self.check_even()
-        if RADIUS not in given and not set(CENTRES) & set(given):
-            raise ValueError("an arc needs a centre or a radius")
-        way = ArcWay(self.normal, clockwise, round(given.get(TURNS, 1.0)), unit)
-        if RADIUS in given:
-            arc = arc_from_radius(start, end, given[RADIUS], way)
-        else:
-            centre = start + np.array([given.get(letter, 0.0) for letter in CENTRES])
-            arc = arc_from_centre(start, end, centre, way)
-        return Arc(self.mapped(arc.centre), -arc.sweep if self.mirrored else arc.sweep)
-
-    def _plane_size(self) -> float:
-        plane = list(IN_PLANE[self.normal])
-        return float(np.linalg.det(self.matrix[np.ix_(plane, plane)]))

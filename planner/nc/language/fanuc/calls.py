@@ -1,13 +1,11 @@
-"""Fanuc's and Haas' macros: their expressions, loops (WHILE [c] DO 1 ... END 1), and calls and returns (M97,
-M98, M99, G65, G66)."""
+"""Fanuc's and Haas' macros: their expressions, and calls and returns (M97, M98, M99, G65, G66)."""
 
 from collections import Counter
 from collections.abc import Sequence
 
 from planner.nc.language import tree
 from planner.nc.language.expressions import ARITHMETIC, COMPARISONS
-from planner.nc.language.source import LineParser, SourceLine
-from planner.nc.language.spelling import LineReader
+from planner.nc.language.source import SourceLine
 from planner.nc.language.system_variables import FanucVariables
 from planner.nc.language.tokens import names, ranked
 from planner.nc.language.tree import Language
@@ -37,8 +35,6 @@ LANGUAGE = Language(
     read="({0} or 0.0)",
     raw=frozenset(("EQ", "NE")),
 )
-_NESTED_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
-_ALWAYS = tree.Number(1.0)  # the condition of DO without WHILE
 _NUMBERS = {  # parameters of the letters of G65
     **dict(zip("ABCIJK", range(1, 7), strict=True)),
     **{"D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17, "R": 18, "S": 19, "T": 20},
@@ -48,75 +44,33 @@ _TRIPLES = "IJK"  # given several times, they are #4 #5 #6, #7 #8 #9 ...
 _LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P are repetitions
 
 
-def condition_of(reader: LineReader) -> tree.Expression:
-    """[a] of IF and WHILE, or [a] AND [b] OR [c], from left to right. Raises ProgramFault."""
-    condition = reader.bracket()
-    while found := next((name for name in ("AND", "OR", "XOR") if reader.take(name)), ""):
-        condition = tree.op(found, condition, reader.bracket())
-    return condition
-
-
-class FanucControl(LineParser):
-    """The statements so far, and the loops that are open, by their DO numbers."""
-
-    def _while(self, reader: LineReader, line: SourceLine) -> None:
-        condition = condition_of(reader)
-        if not reader.take("DO"):
-            raise reader.fault("WHILE [condition] is followed by DO and a number")
-        self._do(reader, line, condition)
-
-    def _do(self, reader: LineReader, line: SourceLine, condition: tree.Expression = _ALWAYS) -> None:
-        number = _loop_number(reader)
-        if any(number == loop.label for loop in self.open) or len(self.open) >= _NESTED_MAX:
-            text = f"DO {number} inside another DO {number}, or more than {_NESTED_MAX} in each other"
-            raise line.fault(text)
-        self.begin(tree.OpenStatement("DO", line.place, condition, number))
-
-    def _end(self, reader: LineReader, line: SourceLine) -> None:
-        number = _loop_number(reader)
-        if not self.open or self.open[-1].label != number:
-            raise line.fault(f"END {number} has no DO {number} before it")
-        loop = self.close()
-        assert loop.condition is not None
-        self.add_loop(loop, loop.condition)
-
-
-def _loop_number(reader: LineReader) -> str:
-    value = reader.value() if reader.kind() == "number" else None
-    if not isinstance(value, tree.Number) or value.value != int(value.value):
-        raise reader.fault("DO and END are followed by a whole number")
-    return f"{value.value:.0f}"
-
-
 def subprogram(words: tree.Words, line: SourceLine, known: frozenset[str]) -> list[tree.Statement]:
     """M98. known : the numbers of the file's programs. Raises ProgramFault."""
-    rest, given = _split(words, "M98", "PL")
+    rest, given = _split(words, "M98", "PL", line)
     if "P" not in given:
         raise line.fault("M98 needs P with the number of a subprogram")
-    program, times = given["P"], given.get("L", tree.Number(1.0))
-    if isinstance(program, tree.Number):
-        number = f"{program.value:.0f}"
+    name: str | tree.Expression = given["P"]
+    times: tree.Expression = given.get("L", tree.ONE)
+    if isinstance(name, tree.Number):
+        number = f"{name.value:.0f}"
         if number not in known and len(number) > _LONGEST_NUMBER and "L" not in given:
             times = tree.Number(float(number[:-_LONGEST_NUMBER]))
             number = number[-_LONGEST_NUMBER:]
-        name: str | tree.Expression = str(int(number))
-    else:
-        name = program
-    return [*_row(rest, line), tree.Call(line.place, name, None, _called("M98", name), times)]
+        name = str(int(number))
+    return [*rest, tree.Call(line.place, name, None, _called("M98", name), times)]
 
 
 def of_block(
     words: tree.Words, line: SourceLine, program: tree.Procedure
 ) -> tuple[int, list[tree.Statement]]:
     """M97: the block that is called, and the statements. Raises ProgramFault."""
-    rest, given = _split(words, "M97", "PL")
-    called = given.get("P")
+    rest, given = _split(words, "M97", "PL", line)
+    called, times = given.get("P"), given.get("L", tree.ONE)
     if not isinstance(called, tree.Number):
         raise line.fault("M97 needs P with the number of a block")
     number = int(called.value)
-    times = given.get("L", tree.Number(1.0))
     call = tree.Call(line.place, block_name(number, program), None, f"M97 P{number}", times)
-    return number, [*_row(rest, line), call]
+    return number, [*rest, call]
 
 
 def returned(
@@ -124,15 +78,13 @@ def returned(
 ) -> list[tree.Statement]:
     """M99. restarts : it stands in the main program, whose statements so far are `before`: a control starts it
     again, or goes to the block P."""
-    rest, given = _split(words, "M99", "P")
-    statements = _row(rest, line)
+    statements, given = _split(words, "M99", "P", line)
     to = given.get("P")
     back = [tree.Number(float(one.number)) for one in before if isinstance(one, tree.Label)]
     if restarts and to is not None and to not in back:
         return [*statements, tree.Goto(line.place, to)]
     if restarts:
-        text = "M99 starts the main program again; it is read once"
-        statements.append(tree.Message(line.place, (text,)))
+        statements.append(tree.Message(line.place, ("M99 starts the main program again; it is read once",)))
     return [*statements, tree.Return(line.place, None, to)]
 
 
@@ -141,7 +93,7 @@ def macro(words: tree.Words, code: str, line: SourceLine) -> tree.Call:
     arguments: dict[int, tree.Expression] = {}
     seen: Counter[str] = Counter()
     program: str | tree.Expression = ""
-    times: tree.Expression = tree.Number(1.0)
+    times: tree.Expression = tree.ONE
     for word in words:
         letter = word.letter
         if word.code == code or letter == "N":
@@ -172,20 +124,17 @@ def block_name(number: int, program: tree.Procedure) -> str:
     return f"N{number} of O{program.name}" if program.name else f"N{number}"
 
 
-def _split(words: tree.Words, code: str, letters: str) -> tuple[list[tree.Word], dict[str, tree.Expression]]:
-    """The words that a call does not use, and those that it does."""
-    rest, given = [], {}
+def _split(
+    words: tree.Words, code: str, letters: str, line: SourceLine
+) -> tuple[list[tree.Statement], dict[str, tree.Expression]]:
+    """The row of the words that a call does not use, if there are any, and those that it does."""
+    rest, given = [], dict[str, tree.Expression]()
     for word in words:
-        letter = word.letter
-        if letter in letters and letter not in given:
-            given[letter] = word.value
+        if word.letter in letters and word.letter not in given:
+            given[word.letter] = word.value
         elif word.code != code:
             rest.append(word)
-    return rest, given
-
-
-def _row(rest: list[tree.Word], line: SourceLine) -> list[tree.Statement]:
-    return [tree.Line(line.place, tuple(rest))] if rest else []
+    return [tree.Line(line.place, tuple(rest))] if rest else [], given
 
 
 def _called(code: str, name: str | tree.Expression) -> str:

@@ -44,14 +44,12 @@ def statements(code: str, words: tree.Words, line: SourceLine) -> tuple[list[tre
     own = {word.letter: word for word in words if word.letter in WORDS[code]}
     rest = tuple(word for word in words if word.code != code and word.letter not in own)
     given = {letter: _scale(word, line) if code == "G51" else word.value for letter, word in own.items()}
+    else_set = "else by a setting of the control; write the"
     if code == "G51" and not own.keys() & set("PIJK"):
-        raise line.fault(
-            "scaling is by a factor P, or I, J and K, else by a setting of the control; write the scaled coordinates out"
-        )
+        raise line.fault(f"scaling is by a factor P, or I, J and K, {else_set} scaled coordinates out")
     if code == "G68" and "R" not in own:
-        raise line.fault(
-            "rotating the coordinate system is by an angle R, else by a setting of the control; write the rotated coordinates out"
-        )
+        what = "rotating the coordinate system is by an angle R"
+        raise line.fault(f"{what}, {else_set} rotated coordinates out")
     if code == "G68" and own.keys() & set("IJK"):
         raise line.fault("G68 with I J K turns about an axis in space, and tilts the plane; write moves out")
     return [tree.made(line.place, MAKERS[code], **given)], rest
@@ -137,7 +135,7 @@ def _polar(making: Making, given: Mapping[str, float]) -> None:
 def _round_pocket(making: Making, given: Mapping[str, float], *, turning: int) -> Iterator[Row]:
     """G12 (turning -1) and G13. Raises ValueError."""
     name = "G13" if turning > 0 else "G12"
-    if making.interpreter.state.normal != 2 or "I" not in given or "Z" not in given:
+    if making.interpreter.state.normal != 2 or not given.keys() >= {"I", "Z"}:
         raise ValueError(f"{name} needs G17, its depth as Z and a radius as I")
     tool = round(given.get("D", 0.0))
     known = making.interpreter.state.tools.get(tool)
@@ -149,7 +147,7 @@ def _round_pocket(making: Making, given: Mapping[str, float], *, turning: int) -
         raise ValueError(f"{name}: I is more than the tool's radius, K than I, with Q from circle to circle")
     count = equal_steps(last - first, given["Q"]) if last > first else 0
     sizes = [*(first + n * given["Q"] for n in range(count)), last]
-    yield from around(making, _circles(making, given, sizes, turning), feed=False)
+    return around(making, _circles(making, given, sizes, turning), feed=False)
 
 
 def _circles(making: Making, given: Mapping[str, float], sizes: list[float], turning: int) -> Iterator[Row]:
@@ -176,9 +174,8 @@ def _pattern(making: Making, given: Mapping[str, float], *, code: str) -> Iterat
     x, y, _ = making.here()
     begin, step = math.radians(given.get("J", 0.0)), math.radians(given.get("K", 360.0 / count))
     for n in range(count):
-        place = (
-            cmath.rect(given["I"], begin + n * step) if code != "G72" else cmath.rect(n * given["I"], begin)
-        )
+        size, angle = (n * given["I"], begin) if code == "G72" else (given["I"], begin + n * step)
+        place = cmath.rect(size, angle)
         yield [("X", x + place.real), ("Y", y + place.imag)]
 
 

@@ -27,13 +27,8 @@ _OF_FIRST_BLOCK = {
     "G72": {"D": "W", "R": "R"},
     "G73": {"I": "U", "K": "W", "D": "R"},
 }
-_NO_DEPTH = {
-    **{
-        cycle: f"the depth of a pass is not given: D, or {c} in a block before this one ({c}2. R0.5)"
-        for cycle, c in (("G71", "U"), ("G72", "W"))
-    },
-    "G73": "G73 needs the number of its passes: D, or R in a block before this one",
-}
+_NO_DEPTH = "the depth of a pass is not given: D, or {0} in a block before this one ({0}2. R0.5)"
+_NO_PASSES = "G73 needs the number of its passes: D, or R in a block before this one"
 # The least increment in the program's unit, 0.001 mm or 0.0001 inch: #4006 is 20 under G20 and 21 under G21.
 _INCREMENT = tree.number(1e-4) + (tree.numbered(4006) - 20) * (1e-3 - 1e-4)
 
@@ -68,19 +63,18 @@ class LatheParser(LatheWords):
             elif all(known.name != _profile_name(pair) for known in procedures):
                 procedures.append(tree.Procedure(_profile_name(pair), body[first].place, body[first:last]))
         if not self.source.file:
-            start = procedures[0].place
-            body = procedures[0].body
+            body, modes = procedures[0].body, (("G", 7.0), ("G", 18.0), ("G", 95.0))
             percent = bool(body) and isinstance(body[0], tree.PlainRows)  # stands before all else
-            body.insert(int(percent), tree.row(start, ("G", 7.0), ("G", 18.0), ("G", 95.0)))
+            body.insert(int(percent), tree.row(procedures[0].place, *modes))
         return procedures
 
     def take_line(self, line: SourceLine) -> None:
         match = _NUMBER.match(line.text.replace(" ", ""))
         number = int(match.group(1)) if match else -1
         begun = [pair for pair in self.pairs if pair[0] == number]
-        for pair in begun:
-            if pair in self.called:  # its cycle has made it: what follows is behind it
-                self.body.append(tree.Goto(line.place, tree.number(_AFTER + pair[1])))
+        # a cycle has made those that are called: what follows is behind it
+        called = (tree.number(_AFTER + pair[1]) for pair in begun if pair in self.called)
+        self.body += [tree.Goto(line.place, behind) for behind in called]
         for pair in begun:
             self.profiles.setdefault(pair, (self.body, len(self.body), -1))
         super().take_line(line)
@@ -95,30 +89,24 @@ class LatheParser(LatheWords):
     def _cycle(self, cycle: str, words: tree.Words, line: SourceLine) -> None:
         letters_of = "PQUWIKDRAXZE" if cycle == "G76" else "PQUWIKDR"
         given = {word.letter: word for word in words if word.letter in letters_of}
-        first = not given.keys() & set("XZUWK") if cycle == "G76" else not given.keys() >= set("PQ")
-        if first:  # of two blocks
-            self.waiting[cycle] = {
+        if not given.keys() & set("XZUWK") if cycle == "G76" else not given.keys() >= set("PQ"):
+            self.waiting[cycle] = {  # of the first of two blocks
                 letter: word.value if letter == "P" else self._length(word, cycle, line)
                 for letter, word in given.items()
             }
             return
-        rest = tuple(word for word in words if word.letter not in letters_of and word.code != cycle)
-        if rest:
+        if rest := tuple(word for word in words if word.letter not in letters_of and word.code != cycle):
             self._words(rest, (), line)
         if cycle == "G76":
             self._thread(given, line)
             return
-        first_block, last_block = (
-            int(value.value) if isinstance(value := given[letter].value, tree.Number) else -1
-            for letter in "PQ"
-        )
-        profile = (first_block, last_block)
-        if profile not in self.pairs:
+        blocks = [given[letter].value for letter in "PQ"]
+        first, last = (int(one.value) if isinstance(one, tree.Number) else -1 for one in blocks)
+        if (profile := (first, last)) not in self.pairs:
             raise line.fault(_no_profile(profile))
         self.cycles.append((profile, line.place))
         self.called.add(profile)
-        name = _profile_name(profile)
-        call = tree.Call(line.place, name, None, f"{cycle} P{profile[0]} Q{profile[1]}")
+        call = tree.Call(line.place, _profile_name(profile), None, f"{cycle} P{first} Q{last}")
         if cycle == "G70":
             start, back = (tree.made(line.place, maker) for maker in (lathe_cycles.start, lathe_cycles.back))
             self.body += [start, call, back]
@@ -129,7 +117,9 @@ class LatheParser(LatheWords):
             if letter not in values and first_letter in before:
                 values[letter] = before[first_letter]
         if "D" not in values:
-            raise line.fault(_NO_DEPTH[cycle])
+            raise line.fault(
+                _NO_PASSES if cycle == "G73" else _NO_DEPTH.format("U" if cycle == "G71" else "W")
+            )
         self.body += [shared(values, line), tree.made(line.place, lathe_cycles.read_profile), call]
         self.body.append(of_shared(line.place, cycle, values))
 
@@ -137,8 +127,7 @@ class LatheParser(LatheWords):
         values = {letter: self._length(word, "G76", line) for letter, word in given.items()}
         if self.feed is None:
             raise line.fault("G76 needs the lead of the thread as an F word")
-        two = "K" not in given
-        if two:
+        if "K" not in given:
             first = self.waiting.get("G76")
             if first is None or "P" not in given or "Q" not in given:
                 raise line.fault("G76 needs K and D, or P and Q with a block G76 P Q R before it")
@@ -147,8 +136,8 @@ class LatheParser(LatheWords):
         else:
             if "D" not in given:
                 raise line.fault("G76 needs D, the depth of the first pass")
-            values.pop("Q", None)  # the angle of the spindle where the thread begins
-            values.pop("R", None)
+            # Q is the angle of the spindle where the thread begins
+            values = {letter: value for letter, value in values.items() if letter not in "QR"}
             text = "G76 in one block: the control's settings for chamfer, least pass and finishing allowance are taken as 0"
             self.body.append(tree.Message(line.place, (text,)))
         values = {letter: value for letter, value in absolute(values).items() if letter in "XZKDQRLAIE"}
@@ -158,10 +147,8 @@ class LatheParser(LatheWords):
 
     def _length(self, word: tree.Word, cycle: str, line: SourceLine) -> tree.Expression:
         """A word of a cycle in the program's unit: a number without a point is in least increments."""
-        letter = word.letter
-        in_increments = _INCREMENTS.get(cycle, "D")
-        is_count = cycle == "G73" and letter == "D"
-        if letter not in in_increments or not isinstance(word.value, tree.Number) or is_count:
+        in_increments = "" if cycle == "G73" else _INCREMENTS.get(cycle, "D")
+        if word.letter not in in_increments or not isinstance(word.value, tree.Number):
             return word.value
         text = self.source.words.data[word.at - self.source.begin :]
         match = re.match(rb"[A-Za-z]\s*[-+]?[\d ]*(\.)?", text)
@@ -173,13 +160,10 @@ class LatheParser(LatheWords):
 def _finishing(first: dict[str, tree.Expression], line: SourceLine) -> dict[str, tree.Expression]:
     """The first block of G76: P mmrraa has the cuts at full depth, ten chamfers in leads, the angle."""
     digits = first.get("P", tree.number(10_000))
-    if (
-        not isinstance(digits, tree.Number)
-        or digits.value != int(digits.value)
-        or not 0 <= digits.value < 1e6
-    ):
+    number = digits.value if isinstance(digits, tree.Number) else -1.0
+    if number != int(number) or not 0 <= number < 1e6:
         raise line.fault("P of the first block of G76 has six digits: how often, chamfer, angle (P010060)")
-    often, rest = divmod(int(digits.value), 10_000)
+    often, rest = divmod(int(number), 10_000)
     chamfer, angle = divmod(rest, 100)
     values = {"L": float(max(often, 1)), "E": chamfer / 10.0, "A": float(angle)}
     found: dict[str, tree.Expression] = {letter: first.get(letter, tree.ZERO) for letter in "QR"}

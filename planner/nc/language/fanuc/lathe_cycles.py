@@ -31,7 +31,7 @@ def start(making: Making, given: Given) -> None:
 
 def back(making: Making, given: Given) -> list[Row]:
     """G70 ends where it began."""
-    return [_fast(making, _start(making))]
+    return [[("G", 0.0), *_to(making, _start(making))]]
 
 
 def read_profile(making: Making, given: Given) -> None:
@@ -175,22 +175,14 @@ def _rows(making: Making, legs: Iterable[Leg], start: complex | None = None) -> 
     for leg in legs:
         if not leg.turning and not leg.pitch and abs(leg.end - at) < turning.SAME:
             continue
-        if leg.fast:
-            rows.append(_fast(making, leg.end))
-        elif leg.pitch:
-            rows.append([("G", 33.0), *_to(making, leg.end), ("K", leg.pitch / making.unit)])
-        elif leg.turning:
-            centre = (leg.centre - at) / making.unit
-            code = 3.0 if leg.turning > 0 else 2.0
-            rows.append([("G", code), *_to(making, leg.end), ("I", centre.imag), ("K", centre.real)])
-        else:
-            rows.append([("G", 1.0), *_to(making, leg.end)])
+        code, centre, more = 0.0 if leg.fast else 1.0, (leg.centre - at) / making.unit, Row()
+        if leg.pitch and not leg.fast:
+            code, more = 33.0, [("K", leg.pitch / making.unit)]
+        elif leg.turning and not leg.fast:
+            code, more = 3.0 if leg.turning > 0 else 2.0, [("I", centre.imag), ("K", centre.real)]
+        rows.append([("G", code), *_to(making, leg.end), *more])
         at = leg.end
     return rows
-
-
-def _fast(making: Making, point: complex) -> Row:
-    return [("G", 0.0), *_to(making, point)]
 
 
 def _to(making: Making, point: complex) -> Row:

@@ -6,7 +6,7 @@ K, G50 S the D of G96, G4 X U a dwell, T0203 rows of its own (T2 M6, G43 H3; T02
 G50 with coordinates are refused.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from planner.nc.language import tree
 from planner.nc.language.fanuc.lathe_cycles import MAKERS
@@ -18,6 +18,7 @@ from planner.nc.language.system_variables import FanucVariables
 CYCLES = ("G70", "G71", "G72", "G73", "G76")
 # Parameters that hold the end of the last block.
 X_HERE, Z_HERE = tree.numbered(5001), tree.numbered(5002)
+_ABSOLUTE = {"U": ("X", X_HERE), "W": ("Z", Z_HERE)}  # axes of increments
 _TOOL_DIGITS = 100  # T0203: tool 2, offset 3
 # Drilling cycles along z, and which they are on mills.
 DRILLS = {f"G{n}": float(n) for n in (81, 82, 83, 84, 85, 86, 89)} | {"G184": 74.0}
@@ -55,6 +56,10 @@ class LatheVariables(FanucVariables):
 class LatheWords(FanucParser):
     """Statements of a lathe's program without cycles."""
 
+    # of `lathe.LatheParser`: a cycle with a profile, and a word of a cycle in the program's unit
+    _cycle: Callable[[str, tree.Words, SourceLine], None]
+    _length: Callable[[tree.Word, str, SourceLine], tree.Expression]
+
     def __init__(self, source: Source):
         super().__init__(source)
         self.feed: tree.Expression | None = None
@@ -70,9 +75,6 @@ class LatheWords(FanucParser):
         # C is an axis, not a chamfer
         self.turns_c = any(ord("C") in source.words.of_rows(row)[0] for row in rapids)
         self.retract: dict[str, tree.Expression] = {}  # R of the first blocks of G74 and G75
-
-    def _cycle(self, cycle: str, words: tree.Words, line: SourceLine) -> None:
-        raise NotImplementedError
 
     def _words(self, words: tree.Words, assignments: tree.Assignments, line: SourceLine) -> None:
         codes = {word.code for word in words}
@@ -124,11 +126,9 @@ class LatheWords(FanucParser):
             raise line.fault(text)
         if codes & (_MOTIONS - DRILLS.keys()):
             self.drill = ""
-        if not named and (
-            not self.drill or codes & _OWN_COORDINATES or not {w.letter for w in words} & set(_PLACE)
-        ):
+        drill, places = named or self.drill, {word.letter for word in words} & set(_PLACE)
+        if not named and (not drill or codes & _OWN_COORDINATES or not places):
             return False
-        drill = named or self.drill
         own = {word.letter: word for word in words if word.letter in _PLACE + "RQPKL"}
         self._rest(tuple(word for word in words if word.code != named), set(own), line)
         self.drill = drill
@@ -139,23 +139,18 @@ class LatheWords(FanucParser):
         values = absolute(given) | ({"R": level} if named or "R" in given else {})
         turning = [("M", _TURNING[drill])] if drill in _TURNING and named else []
         at = {letter: word.at for letter, word in own.items()}
-        start = [
-            tree.word(letter, line.place.at, value) for letter, value in (("G", 17.0), ("G", 98.0), *turning)
-        ]
-        cycle = tree.word("G", line.place.at, DRILLS[drill])
-        holes = (
-            tree.Word("L" if c == "K" else c, at.get(c, line.place.at), value) for c, value in values.items()
-        )
+        start = (("G", 17.0), ("G", 98.0), *turning, ("G", DRILLS[drill]), *values.items())
+        hole = (tree.word("L" if c == "K" else c, at.get(c, line.place.at), value) for c, value in start)
         if "R" in own:
             self.body.append(assumed_row(line.place, "drilling level"))
-        self.body += [tree.Line(line.place, (*start, cycle, *holes)), tree.row(line.place, ("G", 18.0))]
+        self.body += [tree.Line(line.place, tuple(hole)), tree.row(line.place, ("G", 18.0))]
         return True
 
     def _changed(self, word: tree.Word, line: SourceLine) -> tree.Word | None:
         """The word as LinuxCNC's lathes have it; None for one that says nothing."""
         letter, code = word.letter, word.code
         if letter in "UW":
-            axis, here = ("X", X_HERE) if letter == "U" else ("Z", Z_HERE)
+            axis, here = _ABSOLUTE[letter]
             return word._replace(letter=axis, value=here + word.value)
         if letter == "H":
             if word.value != tree.ZERO:
@@ -172,11 +167,10 @@ class LatheWords(FanucParser):
             self.threading = False
         if not self.threading or not any(word.letter in "XZ" for word in words):
             return words
-        others = [word._replace(value=tree.Number(33.0)) if word.code == "G32" else word for word in words]
-        others = [word for word in others if word.letter != "F"]
-        if self.feed is not None:
-            others.append(tree.Word("K", others[-1].at, self.feed))
-        return tuple(others)
+        thread = tree.Number(33.0)
+        others = [w._replace(value=thread) if w.code == "G32" else w for w in words if w.letter != "F"]
+        lead = [] if self.feed is None else [tree.Word("K", others[-1].at, self.feed)]
+        return (*others, *lead)
 
     def _tool(self, words: tree.Words, number: tree.Expression, line: SourceLine) -> tree.Words:
         """T0203 as rows of its own; the other words are left."""
@@ -201,9 +195,7 @@ class LatheWords(FanucParser):
                 raise line.fault("G50 that sets a position is not read; write a work system (G54)")
             self.speed_max = given["S"]
             words = tuple(word for word in words if word.letter != "S" and word.code not in ("G50", "G92"))
-            if self.surface is None:
-                return words
-            return (*words, *self._surface(line))
+            return words if self.surface is None else (*words, *self._surface(line))
         if "G97" in codes:
             self.surface = None
         if "G96" in codes or (self.surface is not None and "S" in given):
@@ -214,25 +206,22 @@ class LatheWords(FanucParser):
 
     def _surface(self, line: SourceLine) -> list[tree.Word]:
         at, speeds = line.place.at, (("S", self.surface), ("D", self.speed_max))
-        return [
-            tree.word("G", at, 96.0),
-            *(tree.word(c, at, speed) for c, speed in speeds if speed is not None),
-        ]
+        given = (tree.word(c, at, speed) for c, speed in speeds if speed is not None)
+        return [tree.word("G", at, 96.0), *given]
 
     def _single(self, words: tree.Words, codes: set[str], line: SourceLine) -> bool:
         """Read a line with such a cycle, or a repeated cut; False if it is none. Raises ProgramFault."""
         letters = {word.letter for word in words}
-        pecks = next((code for code in PECKS if code in codes), "")
-        if pecks:
+        if pecks := next((code for code in PECKS if code in codes), ""):
             self.cut = ""
             self._pecking(pecks, words, line)
             return True
         named = next((code for code in CUTS if code in codes and letters & set(_PLACE)), "")
         if named and codes & _MOTIONS:
-            other = sorted(codes & _MOTIONS)[0]
-            raise line.fault(
-                f"{named} beside {other}: in G code system A it is the {CUTS[named]} cycle; systems B and C are not read"
+            beside = (
+                f"{named} beside {min(codes & _MOTIONS)}: in G code system A it is the {CUTS[named]} cycle"
             )
+            raise line.fault(f"{beside}; systems B and C are not read")
         if codes & _MOTIONS:
             self.cut = ""
             return False
@@ -280,16 +269,15 @@ class LatheWords(FanucParser):
         along, across = "ZX" if cycle == "G74" else "XZ"
         if along not in values:
             raise line.fault(f"{cycle} needs the bottom as {along} or {'W' if along == 'Z' else 'U'}")
-        for letters, peck in (("QK", cycle == "G74"), ("PI", cycle == "G75")):
-            for letter in letters:
-                if letter in of_cycle:
-                    values["K" if peck else "I"] = self._length(of_cycle[letter], cycle, line)
+        for letter in "QKPI":
+            if letter in of_cycle:
+                peck = (letter in "QK") == (cycle == "G74")
+                values["K" if peck else "I"] = self._length(of_cycle[letter], cycle, line)
         if across in values and "I" not in values:
             shift = "P or I" if cycle == "G74" else "Q or K"
             raise line.fault(f"{cycle} with {across} needs {shift}, from one cut to the next")
-        for letter in "RD":
-            if letter in of_cycle:
-                values["D"] = of_cycle[letter].value
+        if relief := of_cycle.get("D", of_cycle.get("R")):
+            values["D"] = relief.value
         if cycle in self.retract:
             values["R"] = self.retract[cycle]
         self.body.append(tree.made(line.place, MAKERS[cycle], **values))
@@ -297,21 +285,15 @@ class LatheWords(FanucParser):
 
     def _rest(self, words: tree.Words, of_cycle: set[str], line: SourceLine) -> None:
         """The line's other words, F S T M, which are executed before the cycle."""
-        rest = tuple(
-            word for word in words if word.letter not in of_cycle and word.code not in (*CUTS, *PECKS)
-        )
-        if rest:
+        codes = (*CUTS, *PECKS)
+        if rest := tuple(word for word in words if word.letter not in of_cycle and word.code not in codes):
             self._words(rest, (), line)
-
-    def _length(self, word: tree.Word, cycle: str, line: SourceLine) -> tree.Expression:
-        """A word of a cycle in the program's unit."""
-        raise NotImplementedError
 
 
 def absolute(given: dict[str, tree.Expression]) -> dict[str, tree.Expression]:
     """Words with X and Z for U and W, which count from where the tool is."""
     values = dict(given)
-    for letter, axis, here in (("U", "X", X_HERE), ("W", "Z", Z_HERE)):
+    for letter, (axis, here) in _ABSOLUTE.items():
         if letter in values:
             values[axis] = here + values.pop(letter)
     return values

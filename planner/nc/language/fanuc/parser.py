@@ -10,21 +10,22 @@ import re
 
 from planner.nc.language import tree
 from planner.nc.language.fanuc import calls, frames
-from planner.nc.language.fanuc.calls import LANGUAGE, FanucControl
+from planner.nc.language.fanuc.calls import LANGUAGE
 from planner.nc.language.makers import corner
 from planner.nc.language.run import Dialect
-from planner.nc.language.source import Source, SourceLine
+from planner.nc.language.source import LineParser, Source, SourceLine
 from planner.nc.language.spelling import LineReader
 from planner.nc.language.system_variables import FanucVariables
 
 _PROGRAM = re.compile(r"[O:](\d+)")
 _GOTO = re.compile(r"GOTO(\d+)?")
 _BEFORE = ("G17", "G18", "G19", "G90", "G91")
-_STOP = 3006.0  # parameter: stop with a message
+_STOP = 3006  # parameter: stop with a message
+_NESTED_MAX = 3  # DO 1 to DO 3 in each other, as the control allows
 _CALLS = ("M98", "M97", "M99", "G65", "G66")
 
 
-class FanucParser(FanucControl):
+class FanucParser(LineParser):
     """Makes statements of one file: a procedure for each of its programs (O numbers)."""
 
     def __init__(self, source: Source):
@@ -79,17 +80,14 @@ class FanucParser(FanucControl):
         if self.targets == frozenset() and self.modal is None:
             self.body.append(rows)
             return
-        first = self.source.first_row
-        words = self.source.words
         begin = rows.first
         for row in range(rows.first, rows.last):
-            letters, values = words.of_rows(row - first)
+            letters, values = self.source.words.of_rows(row - self.source.first_row)
             number = int(values[0]) if len(letters) and letters[0] == ord("N") else None
-            used = number is not None and (self.targets is None or number in self.targets)
-            if used and row > begin:
-                self.body.append(self.source.part(rows, begin, row))
-                begin = row
-            if used and number is not None:
+            if number is not None and (self.targets is None or number in self.targets):
+                if row > begin:
+                    self.body.append(self.source.part(rows, begin, row))
+                    begin = row
                 self.body.append(tree.Label(rows.place, number))
             if self.modal is not None and any(chr(c) in "XYZ" for c in letters):
                 self.body += [self.source.part(rows, begin, row + 1), self.modal]
@@ -107,15 +105,13 @@ class FanucParser(FanucControl):
         label = reader.numbered("N")
         if label is not None and (self.targets is None or label in self.targets):
             self.body.append(tree.Label(line.place, label))
-        if reader.ended:
-            self._messages(reader, line)
-            return
-        if reader.peek() in LANGUAGE.keywords - {"THEN"}:
+        if not reader.ended and reader.peek() in LANGUAGE.keywords - {"THEN"}:
             self._flow(reader.pop().text, reader, line)
             return
         words, assignments = reader.words_and_assignments(line.scale)
-        self._messages(reader, line)
-        self._words(words, assignments, line)
+        self.body += [tree.Message(line.place, (text,)) for _, text in reader.messages()]
+        if words or assignments:
+            self._words(words, assignments, line)
 
     def _program(self, number: str, line: SourceLine) -> None:
         self._end_of_program()
@@ -130,9 +126,6 @@ class FanucParser(FanucControl):
             raise line.fault(f"a second program O{number}")
         self._begin(number, line.place)
 
-    def _messages(self, reader: LineReader, line: SourceLine) -> None:
-        self.body += [tree.Message(line.place, (text,)) for _, text in reader.messages()]
-
     def _flow(self, keyword: str, reader: LineReader, line: SourceLine) -> None:
         flow = {"IF": self._if, "WHILE": self._while, "DO": self._do, "END": self._end}
         if keyword in flow:
@@ -144,8 +137,30 @@ class FanucParser(FanucControl):
             return
         reader.nothing_left(keyword)
 
+    def _while(self, reader: LineReader, line: SourceLine) -> None:
+        condition = _condition_of(reader)
+        if not reader.take("DO"):
+            raise reader.fault("WHILE [condition] is followed by DO and a number")
+        self._do(reader, line, condition)
+
+    def _do(self, reader: LineReader, line: SourceLine, condition: tree.Expression = tree.ONE) -> None:
+        number = _loop_number(reader)
+        if any(number == loop.label for loop in self.open) or len(self.open) >= _NESTED_MAX:
+            raise line.fault(
+                f"DO {number} inside another DO {number}, or more than {_NESTED_MAX} in each other"
+            )
+        self.begin(tree.OpenStatement("DO", line.place, condition, number))
+
+    def _end(self, reader: LineReader, line: SourceLine) -> None:
+        number = _loop_number(reader)
+        if not self.open or self.open[-1].label != number:
+            raise line.fault(f"END {number} has no DO {number} before it")
+        loop = self.close()
+        assert loop.condition is not None
+        self.add_loop(loop, loop.condition)
+
     def _if(self, reader: LineReader, line: SourceLine) -> None:
-        condition = calls.condition_of(reader)
+        condition = _condition_of(reader)
         if reader.take("GOTO"):
             body: list[tree.Statement] = [tree.Goto(line.place, reader.value())]
         elif reader.take("THEN"):
@@ -165,12 +180,13 @@ class FanucParser(FanucControl):
         if "G67" in codes:
             self.modal = None
             words = tuple(word for word in words if word.code != "G67")
+        stop, none = tree.numbered(_STOP), tree.numbered(0)
         for target, _ in assignments:
-            if target == tree.Numbered(tree.Number(_STOP)):
-                words = (*words, tree.Word("M", line.place.at, tree.Number(0.0)))
-            if target == tree.Numbered(tree.Number(0.0)):
+            if target == stop:
+                words = (*words, tree.word("M", line.place.at, 0.0))
+            if target == none:
                 raise line.fault("#0 has no value and cannot be given one")
-        assignments = tuple(pair for pair in assignments if pair[0] != tree.Numbered(tree.Number(_STOP)))
+        assignments = tuple(pair for pair in assignments if pair[0] != stop)
         words = self._frames(words, line)
         before, words = self._corner(words, line)
         self.body += before
@@ -200,10 +216,8 @@ class FanucParser(FanucControl):
     def _corner(self, words: tree.Words, line: SourceLine) -> tuple[list[tree.Statement], tree.Words]:
         """,R and ,C, a rounding or chamfer at the end of the move, and ,A, its angle to the first axis."""
         given = {word.letter: word.value for word in words}
-        before: list[tree.Statement] = []
-        for letter, kind in ((",R", "RND"), (",C", "CHR")):
-            if letter in given:
-                before.append(corner(line.place, kind, given[letter]))
+        kinds = ((",R", "RND"), (",C", "CHR"))
+        before: list[tree.Statement] = [corner(line.place, k, given[c]) for c, k in kinds if c in given]
         if ",A" in given:
             words = (*words, self._at_angle(given, line))
         return before, tuple(word for word in words if word.letter[0] != ",")
@@ -243,14 +257,12 @@ class FanucParser(FanucControl):
 
     def _modal_call(self, call: tree.Call, line: SourceLine) -> None:
         """The call that follows every move: its arguments are computed now and kept in names of their own."""
-        assert call.arguments is not None
-        arguments: list[tuple[int, tree.Expression]] = []
-        for number, value in call.arguments:
-            self.hidden += 1
-            name = tree.Named(f"g66 {self.hidden}", False)
-            self.body.append(tree.assign(line.place, (name, value)))
-            arguments.append((number, name))
-        self.modal = call._replace(arguments=tuple(arguments))
+        given = call.arguments or ()
+        names = [tree.Named(f"g66 {self.hidden + k}", False) for k in range(1, len(given) + 1)]
+        self.hidden += len(given)
+        self.body += [tree.assign(line.place, (one, v)) for one, (_, v) in zip(names, given, strict=True)]
+        numbers = (number for number, _ in given)
+        self.modal = call._replace(arguments=tuple(zip(numbers, names, strict=True)))
 
 
 def _targets(texts: list[str]) -> frozenset[int] | None:
@@ -264,6 +276,21 @@ def _targets(texts: list[str]) -> frozenset[int] | None:
         if ("M99" in text or "M97" in text) and "P" in text:
             return None
     return frozenset(used)
+
+
+def _condition_of(reader: LineReader) -> tree.Expression:
+    """[a] of IF and WHILE, or [a] AND [b] OR [c], from left to right. Raises ProgramFault."""
+    condition = reader.bracket()
+    while found := next((name for name in ("AND", "OR", "XOR") if reader.take(name)), ""):
+        condition = tree.op(found, condition, reader.bracket())
+    return condition
+
+
+def _loop_number(reader: LineReader) -> str:
+    value = reader.value() if reader.kind() == "number" else None
+    if not isinstance(value, tree.Number) or value.value != int(value.value):
+        raise reader.fault("DO and END are followed by a whole number")
+    return f"{value.value:.0f}"
 
 
 DIALECT = Dialect(LANGUAGE, FanucVariables, FanucParser, calls.fanuc_files)

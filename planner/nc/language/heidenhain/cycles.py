@@ -55,8 +55,10 @@ _AWAY_BY = 0.2  # mm
 _OVERLAP = 1.0  # of the tool's radius between two paths, where Q370 is 0
 # Where the tool stands (Q367), in half sides.
 _CORNERS = {0: 0j, 1: -1 - 1j, 2: 1 - 1j, 3: 1 + 1j, 4: -1 + 1j}
+_PLUNGED = (
+    "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
+)
 Given = Mapping[str, float]
-_TURN = 360.0  # [degrees]
 
 
 def _hole(given: Given, what: str = "hole") -> HolePlan:
@@ -91,6 +93,10 @@ def _decreasing(making: Making, hole: HolePlan, given: Given, **pecks: Any) -> I
     return _pecked(making, hole, given, given["Q208"], less=given["Q212"], least=given["Q205"], **pecks)
 
 
+def _breaking(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:
+    return _decreasing(making, hole, given, above=given["Q210"], breaks=round(given["Q213"]))
+
+
 def _pecking(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:
     if given["Q379"]:
         raise ValueError("Q379, a starting point that is drilled already, is not read")
@@ -110,9 +116,8 @@ def _bored(making: Making, given: Given) -> Iterable[Row]:
     if given["Q214"]:
         if given["Q214"] not in _AWAY:
             raise ValueError(f"Q214 {given['Q214']:g}, the direction of disengaging, is none of 0 to 4")
-        dx, dy = _AWAY[round(given["Q214"])]
-        away = _AWAY_BY / making.unit
-        yield [("G", 1.0), ("X", x + away * dx), ("Y", y + away * dy)]
+        dx, dy = (_AWAY_BY / making.unit * way for way in _AWAY[round(given["Q214"])])
+        yield [("G", 1.0), ("X", x + dx), ("Y", y + dy)]
     yield go(hole.clear, given["Q208"] or given["Q206"])
     yield from left(hole)
     yield [("G", 0.0), ("X", x), ("Y", y)]
@@ -167,8 +172,7 @@ def _plan(making: Making, given: Given) -> PocketPlan:
     if kind not in (0, 1, 2):
         raise ValueError(f"Q215 {given['Q215']:g} is none of 0 (all), 1 (roughing) and 2 (finishing)")
     if given["Q366"]:
-        text = "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
-        making.assume(text)
+        making.assume(_PLUNGED)
     making.assume("pockets: passes and allowances are those of the cycle, the single paths this reader's own")
     return PocketPlan(
         depth=_hole(given, "pocket"),
@@ -243,11 +247,7 @@ HOLES: dict[int, Cycle] = {
     200: _drilling(lambda making, hole, given: _pecked(making, hole, given, above=given["Q210"])),
     201: _drilling(lambda making, hole, given: _at_once(hole, given["Q208"])),
     202: _bored,
-    203: _drilling(
-        lambda making, hole, given: _decreasing(
-            making, hole, given, above=given["Q210"], breaks=round(given["Q213"])
-        )
-    ),
+    203: _drilling(_breaking),
     205: _drilling(_pecking),
     206: _drilling(_tapped),
     207: _drilling(lambda making, hole, given: _tapped(making, hole, given, given["Q239"])),
@@ -257,11 +257,7 @@ HOLES: dict[int, Cycle] = {
 }
 CYCLES: dict[int, Cycle] = {
     **HOLES,
-    1: _old_pecking,
-    251: _rectangle,
-    252: _circle,
-    253: _slot,
-    254: _slots_on_circle,
+    **{1: _old_pecking, 251: _rectangle, 252: _circle, 253: _slot, 254: _slots_on_circle},
 }
 
 
@@ -297,13 +293,11 @@ def _pattern(
     given, second = parameters(making), making.numbered[204 + 1]
     if given["Q301"] == 0.0:
         making.numbered[204 + 1] = 0.0
-    n = 0
-    while n < count(given):
+    for n in range(max(math.ceil(count(given)), 0)):
         at = place(given, n)
         making.shared["_x"], making.shared["_y"] = at.real, at.imag
         yield [("G", 0.0), ("X", at.real), ("Y", at.imag)]
         yield from called(making, given)
-        n += 1
     making.numbered[204 + 1] = second
     yield from _up(making)
     _look(making)
@@ -311,8 +305,8 @@ def _pattern(
 
 def _on_circle(given: Given, n: int) -> complex:
     opening = given["Q246"] - given["Q245"]
-    parts = max(given["Q241"] - 1.0 + (abs(opening) >= _TURN), 1.0)
-    step = given["Q247"] + (given["Q247"] == 0.0) * (opening / parts)
+    parts = max(given["Q241"] - 1.0 + (abs(opening) >= 360.0), 1.0)
+    step = given["Q247"] or opening / parts
     angle, half = math.radians(given["Q245"] + n * step), given["Q244"] / 2.0
     return complex(given["Q216"] + half * math.cos(angle), given["Q217"] + half * math.sin(angle))
 

@@ -11,7 +11,7 @@ from planner.base.units import MM_PER_INCH
 from planner.nc.codes import M_GROUP
 from planner.nc.language import tree
 from planner.nc.language.heidenhain import cycles, moves, tables, text
-from planner.nc.language.heidenhain.flow import Flow
+from planner.nc.language.heidenhain.flow import Flow, called_file
 from planner.nc.language.heidenhain.moves import Moves
 from planner.nc.language.making import Making, assumed_row
 from planner.nc.language.source import Source
@@ -21,6 +21,7 @@ from planner.nc.state import NAMED
 
 _VALUE = r"\s*(?:[-+]?\s*(?:\d+\.?\d*|\.\d+|Q[LR]?\d+))"
 _LENGTHS, _OVERSIZE = r"\s*(L|R)(?=[-+.\dQ\s])", r"\s*(DL|DR2|DR):?(?=[-+.\dQ\s])"
+_Q, _TO_THE_TOP = (re.compile(pattern, re.IGNORECASE) for pattern in (r"Q(\d+)\s*=\s*", r"MB\s*MAX"))
 _TOOL_DEF = rf"\s*(?:(\d+)(?:\.\d+)?|(\"[^\"]*\"))?((?:\s*[LR]{_VALUE})*)\s*$"
 _TOOL_CALL = (
     r"\s*(?:(\d+|Q[LR]?\d+)(?:\.\d+)?|(\"[^\"]*\"))?\s*([XYZ])?\s*(?:S\s*([\d.]+|Q[LR]?\d+))?"
@@ -28,6 +29,7 @@ _TOOL_CALL = (
 )
 READ = (*cycles.CYCLES, *cycles.PATTERNS)
 _OLD_PECKING = (200, 201, 202, 211, 206)  # Q parameters that the lines 1.1 to 1.5 of cycle 1 give
+_OLD_WORD = r"\s*(?:SET\s?UP|DIST|ABST|DEPTH|TIEFE|PLNGNG|PECKG|ZUSTLG|DWELL|V\.?\s?ZEIT|F)\s*"
 # Q parameters that are read where they are 0 only.
 _TIP = "is by the angle of the tip, of the control's tool table; write 0, and the depth of the tip as Q201"
 _REFUSED = {
@@ -65,13 +67,16 @@ def _not_read(cycle: int) -> str:
     return f"cycle {cycle} is not read: {why}; {REMEDY}; read are {', '.join(map(str, read))}"
 
 
+def _code_not_read(code: int) -> str:
+    return f"M{code} is not read: {tables.REFUSED[code]}; {REMEDY}"
+
+
 def is_of_the_builder(code: int) -> bool:
     """True if an M code of the builder would be taken for one of RS274NGC or of a printer."""
     found = setting("M", 10 * code, "", "")
-    of_printers = code > tables.OWN_LAST and found is not None and found.what is not UNKNOWN_M
-    return of_printers or (
-        tables.OWN_LAST < code < tables.OF_PATHS and code != tables.ORIENTATION and 10 * code in M_GROUP
-    )
+    of_printers = found is not None and found.what is not UNKNOWN_M
+    of_codes = code < tables.OF_PATHS and code != tables.ORIENTATION and 10 * code in M_GROUP
+    return code > tables.OWN_LAST and (of_printers or of_codes)
 
 
 class Definitions(Flow):
@@ -94,13 +99,11 @@ class Definitions(Flow):
         inch = block.text.upper().split()[-1] == "INCH"
         self.unit, self.moves.feed_scale = (MM_PER_INCH, 0.1) if inch else (1.0, 1.0)
         codes = (20.0 if inch else 21.0, 90.0, 17.0, 40.0, 91.1, 94.0)
-        rows: text.Rows = [tree.row(block.place, *(("G", code) for code in codes))]
-        return [*rows, text.looked_up(block)] if self.file else rows
+        row = tree.row(block.place, *(("G", code) for code in codes))
+        return [row, text.looked_up(block)] if self.file else [row]
 
     def _end(self, block: text.Block) -> text.Rows:
-        if self.file:
-            return [tree.Return(block.place)]
-        return [tree.row(block.place, ("M", 30.0))]
+        return [tree.Return(block.place) if self.file else tree.row(block.place, ("M", 30.0))]
 
     def _tool(self, block: text.Block) -> text.Rows:
         match = block.take(_TOOL_CALL)
@@ -117,12 +120,12 @@ class Definitions(Flow):
             raise block.fault("DL and DR need the number of the tool in their TOOL CALL", match.start(6))
         rows: text.Rows = []
         if tool is not None:
-            number: tree.Expression = tree.Number(float(tool))
+            number: tree.Expression = tree.number(tool)
             if match.group(1) and not match.group(1).isdecimal():
                 block.column = match.start(1)
                 number = block.value()
-            rows.append(tree.row(block.place, ("T", number), ("M", 6.0)))
-            rows.append(tree.row(block.place, ("G", 43.0), ("H", number)))
+            change, length = (("T", number), ("M", 6.0)), (("G", 43.0), ("H", number))
+            rows += [tree.row(block.place, *change), tree.row(block.place, *length)]
             if more_of.get("DL", tree.ZERO) != tree.ZERO:
                 rows.append(tree.row(block.place, ("G", 43.2), ("Z", more_of["DL"])))
             if self.oversizes:
@@ -172,7 +175,7 @@ class Definitions(Flow):
             raise block.wrong(_not_read(cycle))
         self.modal = False
         given: list[tuple[tree.Parameter, tree.Expression]] = []
-        for entry in list(re.compile(r"Q(\d+)\s*=\s*", re.IGNORECASE).finditer(block.text, block.column)):
+        for entry in _Q.finditer(block.text, block.column):
             q, block.column = int(entry[1]), entry.end()
             number = self._feed_value(block, q)
             if q in _REFUSED and number != tree.ZERO:
@@ -206,10 +209,9 @@ class Definitions(Flow):
         if cycle in moves.TITLES:
             return moves.transformed(block, cycle)
         if cycle == 32:
-            if block.take(r"\s*T\s*(?=[-+.\dQ])"):
-                return [tree.row(block.place, ("G", 64.0), ("P", block.value()))]
+            tolerance = [("P", block.value())] if block.take(r"\s*T\s*(?=[-+.\dQ])") else []
             # 32.1 without T: the machine's tolerance again; 32.2: filter and rotary axes
-            return [tree.row(block.place, ("G", 64.0))] if part == 1 else []
+            return [tree.row(block.place, ("G", 64.0), *tolerance)] if tolerance or part == 1 else []
         if cycle == 9:
             block.take(r"\s*(?:V\.?\s?ZEIT|DWELL|V\.TIME|DW\.TIME)\s*")
             return [tree.row(block.place, ("G", 4.0), ("P", block.value()))]
@@ -221,10 +223,7 @@ class Definitions(Flow):
         """Cycle 1: its lines give parameters of cycle 200, and the surface lies below the tool."""
         if part == 0:
             return [tree.assign(block.place, (text.variable("cycle"), tree.ONE))]
-        column, match = (
-            block.column,
-            block.take(r"\s*(?:SET\s?UP|DIST|ABST|DEPTH|TIEFE|PLNGNG|PECKG|ZUSTLG|DWELL|V\.?\s?ZEIT|F)\s*"),
-        )
+        column, match = block.column, block.take(_OLD_WORD)
         if match is None or not 1 <= part <= len(_OLD_PECKING):
             raise block.fault("DIST, DEPTH, PLNGNG (PECKG), DWELL and F of cycle 1 are expected", column)
         value = tree.op("ABS", block.value())  # older controls had the signs of directions in z
@@ -241,24 +240,21 @@ class Definitions(Flow):
         """Statements of M codes before and after the move, and whether it goes by machine coordinates."""
         before: text.Rows = []
         after: text.Rows = []
-        machine = False
+        machine, nothing = False, set[int](() if self.compensates else tables.OF_COMPENSATION)
+        nothing |= set(() if self.source.at_tip else tables.OF_ROTARY)
         for code, column in given.codes:
             at = block.byte(column)
             as_it_is = Line(block.place, (word("M", at, float(code)),))
             if code in (89, 99):
                 after += self._call_cycle(block)
                 self.modal = code == 89
-            elif code == 140 and (
-                given.back is not None or re.search(r"MB\s*MAX", block.text, re.IGNORECASE)
-            ):
+            elif code == 140 and (given.back is not None or _TO_THE_TOP.search(block.text)):
                 before += self._retract(block, given)
             elif code in (126, 127):
                 self.shortest = code == 126
             elif code in (136, 137):
                 before.append(tree.row(block.place, ("G", 95.0 if code == 136 else 94.0)))
-            elif (code in tables.OF_COMPENSATION and not self.compensates) or (
-                code in tables.OF_ROTARY and not self.source.at_tip
-            ):
+            elif code in nothing:
                 continue
             elif code == 91 and not straight:
                 raise block.fault("M91, machine coordinates, is read in L", column)
@@ -270,31 +266,33 @@ class Definitions(Flow):
             elif code in (*TOOL_POINT_ON, *TOOL_POINT_OFF) and self.source.at_tip:
                 before += [as_it_is, text.looked_up(block)]
             elif code in tables.REFUSED:
-                raise block.fault(f"M{code} is not read: {tables.REFUSED[code]}; {REMEDY}", column)
+                raise block.fault(_code_not_read(code), column)
             elif code in tables.NOTHING:
                 continue
             elif code in tables.AT_END and self.file:
                 after.append(Return(block.place))
             elif code in (0, 1, 5, 9, *tables.AT_END):
                 after.append(as_it_is)
-            else:
+            elif is_of_the_builder(code):
                 # planned and flat programs do not have it: whoever read them would take it for another
-                before.append(
-                    assumed_row(block.place, "machine code") if is_of_the_builder(code) else as_it_is
-                )
+                before.append(assumed_row(block.place, "machine code"))
+            else:
+                before.append(as_it_is)
         return before, after, machine
 
     def _retract(self, block: text.Block, given: text.Items) -> text.Rows:
         """M140: back along the tool's axis by MB, or to machine zero."""
         if given.back is None:
             return moves.to_the_top(block)
-        way = {"Z": text.POSITION["Z"] + given.back}
-        fast = given.feed is None
-        return self.moves.straight(block, text.Items(feed=None if given.axes else given.feed, fast=fast), way)
+        items = text.Items(feed=None if given.axes else given.feed, fast=given.feed is None)
+        return self.moves.straight(block, items, {"Z": text.POSITION["Z"] + given.back})
 
     def _call_program(self, block: text.Block) -> text.Rows:
-        """CALL PGM. Raises ProgramFault without a name."""
-        raise NotImplementedError
+        if not (name := called_file(block.rest)):
+            raise block.wrong("CALL PGM is followed by the name of a program")
+        units = tree.row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
+        called = tree.Call(block.place, name, None, block.rest.strip())
+        return [called, units, text.looked_up(block)]
 
     def _codes_alone(self, block: text.Block) -> tuple[text.Rows, text.Rows]:
         column, given = block.column, text.items(block)
@@ -302,17 +300,15 @@ class Definitions(Flow):
         own = (*TOOL_POINT_ON, 140)  # with a feed of their own
         feed = given.feed is not None and not any(code in own for code, _ in given.codes)
         if given.axes or given.polar or given.turn or feed or given.side is not None:
-            for code in (code for code, _ in given.codes if code in tables.REFUSED):
-                raise block.fault(f"M{code} is not read: {tables.REFUSED[code]}; {REMEDY}", column)
-            raise block.fault("only M codes are read here; write the move and its feed with L", column)
+            refused = (_code_not_read(code) for code, _ in given.codes if code in tables.REFUSED)
+            text_of = "only M codes are read here; write the move and its feed with L"
+            raise block.fault(next(refused, text_of), column)
         before, after, _ = self._codes(block, given)
         return before, after
 
     def _code(self, block: text.Block) -> text.Rows:
-        block.column = 0
+        """M codes alone, and STOP with some."""
+        stops = block.function == "STOP"
+        block.column = block.column if stops else 0
         before, after = self._codes_alone(block)
-        return [*before, *after]
-
-    def _stop(self, block: text.Block) -> text.Rows:
-        before, after = self._codes_alone(block)
-        return [*before, row(block.place, ("M", ZERO)), *after]
+        return [*before, *([row(block.place, ("M", ZERO))] if stops else []), *after]

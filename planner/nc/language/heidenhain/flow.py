@@ -95,8 +95,8 @@ class Flow:
             operation: tree.Expression = position("XYZ"[int(axis[1]) - 1])
         elif number in _FN_ONE:
             block.take(r"(?:SQRT|SIN|COS)\s*")
-            given = block.value()
-            operation = tree.op(_FN_ONE[number], given) if _FN_ONE[number] else given
+            operation = block.value()
+            operation = tree.op(_FN_ONE[number], operation) if _FN_ONE[number] else operation
         else:
             left = block.value()
             if not block.take(r"\s*(?:DIV|LEN|ANG|[-+*])\s*(?=[-+.\dQ])"):
@@ -118,7 +118,7 @@ class Flow:
         right = block.value()
         if not block.take(r"\s*GOTO\s+LBL\s*"):
             raise block.wrong("GOTO LBL is expected here")
-        go: Rows = [tree.Goto(block.place, tree.Number(float(self._label(block))))]
+        go: Rows = [tree.Goto(block.place, tree.number(self._label(block)))]
         return [tree.If(block.place, ((tree.op(_COMPARE[compare[1].upper()], left, right), go),), [])]
 
 

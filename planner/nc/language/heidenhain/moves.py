@@ -82,14 +82,8 @@ class Moves:
 
     def circle(self, block: text.Block, given: text.Items, ends: Ends) -> text.Rows:
         """C: an arc about the pole, in its plane."""
-        code = _arc_code(block, given)
-
-        def rows(normal: int) -> text.Rows | None:
-            if _AXES[normal] in ends:
-                return None
-            return self._arc(block, given, ends, code, normal)
-
-        return self.by_plane(block, rows)
+        arc = partial(self._arc, block, given, ends, _arc_code(block, given))
+        return self.by_plane(block, lambda normal: None if _AXES[normal] in ends else arc(normal))
 
     def _arc(
         self,
@@ -132,13 +126,11 @@ class Moves:
 
     def polar(self, block: text.Block, given: text.Items) -> text.Rows:
         """The statement that finds the polar coordinates of LP and CTP."""
-        change: list[tuple[tree.Parameter, tree.Expression]] = []
-        for name, variable in zip(("PR", "PA"), text.POLAR, strict=True):
-            if name in given.polar:
-                change.append((variable, given.polar[name]))
-            elif "I" + name in given.polar:
-                change.append((variable, variable + given.polar["I" + name]))
-        return [tree.assign(block.place, *change)] if change else []
+        names = dict(zip(("PR", "PA"), text.POLAR, strict=True))
+        change = {one: one + given.polar["I" + c] for c, one in names.items() if "I" + c in given.polar}
+        change |= {one: given.polar[c] for c, one in names.items() if c in given.polar}
+        in_order = ((one, change[one]) for one in text.POLAR if one in change)
+        return [tree.assign(block.place, *in_order)] if change else []
 
     def polar_ends(self, block: text.Block, given: text.Items, normal: int = _WORKING) -> Ends | None:
         """Coordinates of polar ones, and along the normal; None for a block with one in the plane."""
@@ -155,12 +147,11 @@ class Moves:
 
     def to_polar(self, block: text.Block, given: text.Items) -> text.Rows:
         """LP and CTP: L and, in the working plane, CT to polar coordinates."""
-        move, planes = (
-            (self.straight, (0, 1, _WORKING)) if block.function == "LP" else (self.tangent_arc, (_WORKING,))
-        )
+        straight = block.function == "LP"
+        move = self.straight if straight else self.tangent_arc
 
         def rows(normal: int) -> text.Rows | None:
-            ends = self.polar_ends(block, given, normal) if normal in planes else None
+            ends = self.polar_ends(block, given, normal) if straight or normal == _WORKING else None
             return None if ends is None else move(block, given, ends)
 
         return [*self.polar(block, given), *self.by_plane(block, rows)]
@@ -173,9 +164,7 @@ class Moves:
         if by is None and "PA" not in given.polar:
             raise block.fault("CP needs PA or IPA")
         radius, angle = text.POLAR
-        turns = None
-        if by is not None:
-            turns = tree.op("FUP", tree.op("ABS", by) / 360 - 1e-9)
+        turns = None if by is None else tree.op("FUP", tree.op("ABS", by) / 360 - 1e-9)
 
         def rows(normal: int) -> text.Rows | None:
             first, second = (text.POSITION[_AXES[a]] - text.POLE[a] for a in IN_PLANE[normal])
@@ -222,12 +211,8 @@ def approach_rows(block: text.Block, moves: Moves) -> tuple[text.Rows, text.Item
         ends = by_pole
     if (found.polar and not kind[1]) or found.turn or found.fast:
         raise block.fault("APPR and DEP take X Y Z, LEN, R, CCA, RL or RR, and F", column)
-    given |= ends
-    if found.radius is not None:
-        given["R"] = found.radius
     fed = moves.automatic if found.automatic else found.feed
-    if fed is not None:
-        given["F"] = fed
+    given |= ends | {c: value for c, value in (("R", found.radius), ("F", fed)) if value is not None}
     if departs:
         if found.side:
             raise block.fault("DEP switches radius compensation off; RL and RR do not belong to it", column)
@@ -238,7 +223,7 @@ def approach_rows(block: text.Block, moves: Moves) -> tuple[text.Rows, text.Item
     return [*before, approach, tree.assign(block.place, *_assigned(ends))], found
 
 
-def frame_rows(block: text.Block, given: dict[str, tree.Expression], cycle: int) -> text.Rows:
+def frame_rows(block: text.Block, given: Ends, cycle: int) -> text.Rows:
     """A part of the frame; the position is asked for behind it, since it has other coordinates then."""
     frame = tree.made(block.place, partial(makers.heidenhain_frame, cycle=cycle), **given)
     return [frame, text.looked_up(block)]
@@ -256,30 +241,29 @@ def datum_rows(block: text.Block) -> text.Rows:
     match = block.take(r"\s*(AXIS|RESET)\b")
     if match is None:
         raise block.wrong("TRANS DATUM is followed by AXIS and coordinates, or by RESET")
-    if match[1].upper() == "RESET":
-        return frame_rows(block, dict.fromkeys("XYZ", tree.ZERO), 7)
-    return frame_rows(block, _shifts(block), 7)
+    ends = match[1].upper() == "RESET"
+    return frame_rows(block, dict.fromkeys("XYZ", tree.ZERO) if ends else _shifts(block), 7)
 
 
 def transformed(block: text.Block, cycle: int) -> text.Rows:
     """The line n.1 (or n.2 ...) of a cycle of the frame. Raises ProgramFault."""
+    given: Ends
     if cycle == 7:
-        return frame_rows(block, _shifts(block), 7)
-    if cycle == 8:
-        axes = block.rest.upper().split()
-        if any(axis not in ("X", "Y", "Z") for axis in axes):
+        given = _shifts(block)
+    elif cycle == 8:
+        given = dict.fromkeys(block.rest.upper().split(), tree.ZERO)
+        if given.keys() - {"X", "Y", "Z"}:
             raise block.wrong("a mirror image takes the axes X, Y and Z, or none to end it")
-        return frame_rows(block, dict.fromkeys(axes, tree.ZERO), cycle)
-    if cycle == 26:
+    elif cycle == 26:
         given = block.named(r"\s*(CC[XYZ]|[XYZ])\s*(?=[-+.\dQ])")
         block.end("cycle 26 takes factors X Y Z and their centre CCX CCY CCZ")
-        return frame_rows(block, given, cycle)
-    column, word = block.column, block.take(r"\s*(I?ROT|SCL)\s*")
-    if word is None or (word[1].upper() == "SCL") != (cycle == 11):
-        raise block.fault("ROT or IROT of cycle 10, or SCL of cycle 11 is expected here", column)
-    number = block.value()
-    block.end()
-    return frame_rows(block, {word[1].upper(): number}, cycle)
+    else:
+        column, word = block.column, block.take(r"\s*(I?ROT|SCL)\s*")
+        if word is None or (word[1].upper() == "SCL") != (cycle == 11):
+            raise block.fault("ROT or IROT of cycle 10, or SCL of cycle 11 is expected here", column)
+        given = {word[1].upper(): block.value()}
+        block.end()
+    return frame_rows(block, given, cycle)
 
 
 def plane_rows(block: text.Block) -> text.Rows:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from planner.nc.language import tree
 from planner.nc.language.heidenhain import cycles, moves, patterns, text
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
-from planner.nc.language.heidenhain.flow import called_file, files, procedure_name
+from planner.nc.language.heidenhain.flow import files, procedure_name
 from planner.nc.language.makers import compensate, corner
 from planner.nc.language.making import Cycle, assumed_row
 from planner.nc.language.run import Dialect
@@ -54,28 +54,24 @@ class HeidenhainParser(Definitions):
         shared = bool(self.file) or any(re.match("CALL PGM", b.text, re.IGNORECASE) for b in self.blocks)
         self.poles = bool(poles) or shared
         self.moves.tilted = shared or any("Z" in pole for pole in poles)
-        source = self.source
-        start = tree.SourcePlace(source.file, 1, source.begin)
+        start = tree.SourcePlace(self.file, 1, self.source.begin)
         main = self._body(0, len(self.blocks))
         procedures = []
         done: set[int] = set()
         while todo := self.called - done:
+            done |= todo
             for label in sorted(todo):
-                done.add(label)
-                if label in self.known:
-                    first = self.known[label]
-                    rest = range(first + 1, len(self.blocks))
-                    ends = (k for k in rest if re.match(r"LBL\s*0\b", self.blocks[k].text, re.IGNORECASE))
-                    body = self._body(first, next(ends, len(self.blocks)), True)
-                    name = procedure_name(label, source.file)
-                    procedures.append(tree.Procedure(name, self.blocks[first].place, body))
-        set_up: list[tuple[tree.Parameter, tree.Expression]] = [
-            (text.variable(f"rep{source.file}_{k}"), tree.ZERO) for k in range(self.repeats)
-        ]
-        if not source.file:
-            set_up += [(one, tree.ZERO) for one in (*text.POSITION.values(), *text.POLE, *text.POLAR)]
-            set_up += [(text.variable("cycle"), tree.ZERO), (text.PLANE, tree.number(2))]
-        name = "file" if source.file else ""
+                first = self.known[label]
+                rest = range(first + 1, len(self.blocks))
+                ends = (k for k in rest if re.match(r"LBL\s*0\b", self.blocks[k].text, re.IGNORECASE))
+                body = self._body(first, next(ends, len(self.blocks)), True)
+                name = procedure_name(label, self.file)
+                procedures.append(tree.Procedure(name, self.blocks[first].place, body))
+        zeros: list[tree.Parameter] = [text.variable(f"rep{self.file}_{k}") for k in range(self.repeats)]
+        if not self.file:
+            zeros += [*text.POSITION.values(), *text.POLE, *text.POLAR, text.variable("cycle")]
+        set_up = [(one, tree.ZERO) for one in zeros] + [(text.PLANE, tree.number(2))] * (not self.file)
+        name = "file" if self.file else ""
         return [tree.Procedure(name, start, [tree.assign(start, *set_up), *main]), *procedures]
 
     def _find_labels(self) -> None:
@@ -95,14 +91,13 @@ class HeidenhainParser(Definitions):
     def _body(self, first: int, last: int, called: bool = False) -> text.Rows:
         """Statements of blocks `first` to `last` - 1; faults of `called` subprograms are known already."""
         body: text.Rows = []
-        faults = len(self.faults)
-        self.skip = False
+        faults, self.skip = len(self.faults), False
         for k in range(first, last):
-            if self.skip:
-                self.skip = False
-                continue
             try:
-                body += self._block(k, last)
+                if not self.skip:
+                    body += self._block(k, last)
+                else:
+                    self.skip = False
             except tree.ProgramFault as fault:
                 self.faults.append(fault)
         if called:
@@ -121,11 +116,10 @@ class HeidenhainParser(Definitions):
             raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
         if match is None or read is None:
             why = f" ({_WHY[name]})" if name in _WHY else ""
-            if name[:1] == "G" and name[1:].isdigit() and not why:
+            if name[:1] == "G" and name[1:].isdigit():
                 why = "; a program in G codes is read without --dialect heidenhain"
-            raise block.fault(
-                f"{name or block.text[:20]} of the conversational language is not read{why}; {REMEDY}"
-            )
+            what = f"{name or block.text[:20]} of the conversational language"
+            raise block.fault(f"{what} is not read{why}; {REMEDY}")
         block.function, block.column = name, 0 if along else match.end()
         if name not in _MOVES:
             return read(self, block)
@@ -133,21 +127,12 @@ class HeidenhainParser(Definitions):
         self.skip = bool(corner)
         return [*corner, *read(self, block)]
 
-    def _call_program(self, block: text.Block) -> text.Rows:
-        name = called_file(block.rest)
-        if not name:
-            raise block.wrong("CALL PGM is followed by the name of a program")
-        units = tree.row(block.place, ("G", 21.0 if self.unit == 1.0 else 20.0))
-        called = tree.Call(block.place, name, None, block.rest.strip())
-        return [called, units, text.looked_up(block)]
-
     def _ends(self, block: text.Block, given: text.Items) -> dict[str, tree.Expression]:
         if given.polar:
             raise block.fault("polar coordinates belong to LP and CP")
         ends = {axis: text.absolute(axis, found) for axis, found in given.axes.items()}
         for axis in ends.keys() & set("ABC") if self.shortest else ():
-            here = position(axis)
-            ends[axis] = here + tree.op("WRAPPED", ends[axis] - here)
+            ends[axis] = position(axis) + tree.op("WRAPPED", ends[axis] - position(axis))
         return ends
 
     def _straight(self, block: text.Block) -> text.Rows:
@@ -161,11 +146,8 @@ class HeidenhainParser(Definitions):
             lines += self.moves.to_polar(block, given)
         else:
             lines += self.moves.straight(block, given, self._ends(block, given), machine)
-        if (
-            self.modal
-            and {"X", "Y"} & given.axes.keys()
-            and not any(code in (89, 99) for code, _ in given.codes)
-        ):
+        calls = any(code in (89, 99) for code, _ in given.codes)
+        if self.modal and {"X", "Y"} & given.axes.keys() and not calls:
             after = [*self._call_cycle(block), *after]
         return [*lines, *([text.looked_up(block)] if machine else []), *after]
 
@@ -191,16 +173,15 @@ class HeidenhainParser(Definitions):
         before += self._side(block, given)
         if name == "CTP":
             self._need_pole(block)
-            return [*before, *self.moves.to_polar(block, given), *after]
-        if name == "CP":
+            rows = self.moves.to_polar(block, given)
+        elif name == "CP":
             rows = self.moves.polar_arc(block, given)
-            self._need_pole(block)
-            return [*before, *rows, *after]
-        if (name != "C" or not self.moves.tilted) and "Z" in given.axes:
+        elif (name != "C" or not self.moves.tilted) and "Z" in given.axes:
             raise block.fault("an arc with Z; a helix is written as CP with IPA")
-        how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
-        rows = how(block, given, self._ends(block, given))
-        if name == "C":
+        else:
+            how = {"C": self.moves.circle, "CR": self.moves.radius_arc, "CT": self.moves.tangent_arc}[name]
+            rows = how(block, given, self._ends(block, given))
+        if name in ("C", "CP"):
             self._need_pole(block)
         return [*before, *rows, *after]
 
@@ -226,7 +207,7 @@ class HeidenhainParser(Definitions):
             raise block.fault(why, column)
         named = [(text.POLE["XYZ".index(axis)], end) for axis, end in ends.items()]
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
-        return [tree.assign(block.place, *named, (text.PLANE, tree.Number(float(normal))))]
+        return [tree.assign(block.place, *named, (text.PLANE, normal))]
 
     def _cycle_call(self, block: text.Block) -> text.Rows:
         if block.take(r"\s*PAT\b"):
@@ -270,16 +251,12 @@ class HeidenhainParser(Definitions):
 
     def _tool_point(self, block: text.Block) -> text.Rows:
         """FUNCTION TCPM and FUNCTION RESET TCPM, as M128 and M129."""
-        ends, code = block.function == "FUNCTION RESET", text.Items(codes=[(128, 0)])
-        if ends:
-            if not self.source.at_tip:
-                return []
-            code = text.Items(codes=[(129, 0)])
-        elif re.search(r"AXIS\s+SPAT|F\s+CONT|PATHCTRL\s+VECTOR", block.text, re.IGNORECASE):
-            raise block.fault(
-                "FUNCTION TCPM with AXIS SPAT, F CONT or PATHCTRL VECTOR is not read; write F TCP AXIS POS PATHCTRL AXIS"
-            )
-        return self._codes(block, code)[0]
+        ends, others = block.function == "FUNCTION RESET", "AXIS SPAT, F CONT or PATHCTRL VECTOR"
+        if not ends and re.search(r"AXIS\s+SPAT|F\s+CONT|PATHCTRL\s+VECTOR", block.text, re.IGNORECASE):
+            raise block.fault(f"FUNCTION TCPM with {others} is not read; write F TCP AXIS POS PATHCTRL AXIS")
+        if ends and not self.source.at_tip:
+            return []
+        return self._codes(block, text.Items(codes=[(129 if ends else 128, 0)]))[0]
 
 
 _READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
@@ -304,8 +281,7 @@ _READ: dict[str, Callable[[HeidenhainParser, text.Block], text.Rows]] = {
     "IF": HeidenhainParser._jump,
     **dict.fromkeys(("CYCL DEF", "CYCLE DEF"), HeidenhainParser._define),
     "CYCL CALL": HeidenhainParser._cycle_call,
-    "STOP": HeidenhainParser._stop,
-    "M": HeidenhainParser._code,
+    **dict.fromkeys(("STOP", "M"), HeidenhainParser._code),
 }
 
 

@@ -135,14 +135,12 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 
 def blocks(source: Source) -> Iterator[Block]:
     """The blocks of a program, but for those that begin with / where such are left out."""
-    waiting: tuple[tree.SourcePlace, str, list[tuple[int, int]]] | None = None
+    waiting: Block | None = None
     open_end = hidden = False
-    at, file = source.begin, source.file
+    at = source.begin
     for number, raw in enumerate(source.words.data.split(b"\n"), start=1):
-        text = raw.decode("latin-1")
-        start = at
-        at += len(raw) + 1
-        body = text.split(";", 1)[0].rstrip()
+        start, at = at, at + len(raw) + 1
+        body = raw.decode("latin-1").split(";", 1)[0].rstrip()
         numbered = _NUMBERED.match(body)
         first = numbered.end() if numbered else len(body) - len(body.lstrip())
         hidden = hidden or body[first : first + 1] == "/"
@@ -154,17 +152,18 @@ def blocks(source: Source) -> Iterator[Block]:
         content = "" if body.strip().isdigit() else body[first:]  # a number alone stands before a comment
         ends_open = content.endswith("~")
         content = content.rstrip("~ \t\r\x1a")
-        cycle = waiting is not None and waiting[1].upper().startswith("CYCL DEF") and not numbered
+        cycle = waiting is not None and waiting.text.upper().startswith("CYCL DEF") and not numbered
         if waiting is not None and content and (open_end or (cycle and _CONTINUED.match(body))):
-            place, before, parts = waiting
-            waiting = place, f"{before} {content}", [*parts, (start + first, len(before) + 1)]
+            waiting.at = (*waiting.at, (start + first, len(waiting.text) + 1))
+            waiting.text += f" {content}"
         elif content:
             if waiting is not None:
-                yield Block(waiting[0], waiting[1], tuple(waiting[2]))
-            waiting = (tree.SourcePlace(file, number, start + first), content, [(start + first, 0)])
+                yield waiting
+            place = tree.SourcePlace(source.file, number, start + first)
+            waiting = Block(place, content, ((start + first, 0),))
         open_end = ends_open or (open_end and not content)
     if waiting is not None:
-        yield Block(waiting[0], waiting[1], tuple(waiting[2]))
+        yield waiting
 
 
 class Formula(TokenReader):
@@ -267,8 +266,8 @@ def items(block: Block, turning: bool = False) -> Items:
         elif item["ahead"]:  # of M120, blocks that the control looks ahead
             block.value()
         elif item["unit"]:
-            what = "a feed per tooth, turn or time, is not read; write F in mm/min"
-            raise block.fault(f"{item['unit'].upper()}, {what}", at)
+            what = item["unit"].upper()
+            raise block.fault(f"{what}, a feed per tooth, turn or time, is not read; write F in mm/min", at)
         elif item["feed"]:
             found.feed = block.value()
         else:

@@ -36,7 +36,6 @@ LANGUAGE = Language(
 # What M70 to M73 do with the modes.
 _MODES = {70: "save", 71: "forget", 72: "restore", 73: "save until return"}
 _FLOW = frozenset(("98", "99", *map(str, _MODES)))  # numbers of M codes that are statements
-_PROGRAM = ""
 _NEXT_PROGRAM = re.compile(
     rb"^[ \t]*(?:(?:N[\d \t]+)?M[ \t]*(99)(?!\d)|O[ \t]*\d+[ \t\r]*(?:\(|;|$))", re.MULTILINE | re.IGNORECASE
 )
@@ -101,23 +100,20 @@ class LinuxcncParser(LineParser):
         kind = _ENDS[keyword]
         top = self._innermost(kind, keyword, label, line)
         self.close()
-        if kind == "sub":
-            if condition is not None:
-                top.body.append(tree.Return(line.place, condition))
-        elif kind == "if":
+        if kind == "if":
             self.body.append(top.branched())
-        else:
+        elif kind != "sub":
             assert top.condition is not None
             self.body.append(tree.Loop(top.place, kind, label, top.condition, top.body))
+        elif condition is not None:
+            top.body.append(tree.Return(line.place, condition))
 
     def _innermost(self, kind: str, keyword: str, label: str, line: SourceLine) -> tree.OpenStatement:
-        if not self.open or self.open[-1].kind != kind or self.open[-1].label != label:
-            last = "nothing is open"
-            if self.open:
-                top = self.open[-1]
-                last = f"o{top.label} {top.kind} on line {top.place.line} is open"
+        top = self.open[-1] if self.open else None
+        if top is None or top.kind != kind or top.label != label:
+            last = f"o{top.label} {top.kind} on line {top.place.line} is open" if top else "nothing is open"
             raise line.fault(f"o{label} {keyword} has no o{label} {kind} before it: {last}")
-        return self.open[-1]
+        return top
 
     def parse(self) -> list[tree.Procedure]:
         """All procedures of the file; the main program first, under the empty name."""
@@ -126,10 +122,8 @@ class LinuxcncParser(LineParser):
             end = "while [condition]" if left.kind == "do" else f"end{left.kind}"
             text = f"this {left.kind} has no end; write o{left.label} {end}"
             self.faults.append(tree.ProgramFault(left.place, text))
-        return [
-            tree.Procedure(_PROGRAM, tree.SourcePlace(self.source.file, 1, 0), self.main),
-            *self.procedures.values(),
-        ]
+        main = tree.Procedure("", tree.SourcePlace(self.source.file, 1, 0), self.main)
+        return [main, *self.procedures.values()]
 
     def take_plain(self, rows: tree.PlainRows) -> None:
         in_main = self.body is self.main
@@ -243,12 +237,11 @@ def _pieces(text: str) -> tuple[str | tree.Named | tree.Numbered, ...]:
     for found in _PARAMETER.finditer(text):
         pieces.append(text[done : found.start()])
         done = found.end()
-        if found.group(2):
-            number = float(found.group(2))
-            known = 1 <= number <= LANGUAGE.largest
-            pieces.append(tree.Numbered(tree.Number(number)) if known else found.group())
+        if found[2]:
+            known = 1 <= int(found[2]) <= LANGUAGE.largest
+            pieces.append(tree.numbered(int(found[2])) if known else found[0])
         else:
-            name = re.sub(r"\s", "", found.group(1)).lower()
+            name = re.sub(r"\s", "", found[1]).lower()
             pieces.append(tree.Named(name, name.startswith("_")))
     return (*pieces, text[done:])
 

@@ -54,7 +54,7 @@ class BlockWords(Places):
                 axis = AXES["IJK".index(name[0])]
                 value = self._given(reader, axis, at)
                 assert value is not None
-                row.through[f"{axis}1"] = self._absolute(axis, value)
+                row.through[f"{axis}1"] = self._absolutes({axis: value})[axis]
             elif name in self.names and self.names[name][1:] == ((0,),):
                 self._text_value(reader)
             elif reader.peek() in ("[", "=") and (target := reader.parameter(token)):
@@ -73,18 +73,23 @@ class BlockWords(Places):
         reader.expect("=")
         row.before.append(makers.corner(reader.place, kind, reader.expression()))
 
-    def _rounding(self, reader: LineTokens, row: Row) -> None:
-        reader.expect("=")
-        value = reader.expression()
-        self.rounding = None if value == tree.ZERO else value
-
-    def _machine(self, reader: LineTokens, row: Row) -> None:
-        """SUPA: machine coordinates."""
-        row.words.append(tree.word("G", reader.start + reader.tokens[reader.next - 1].at, 53.0))
-
-    def _stop_reading(self, reader: LineTokens, row: Row) -> None:
-        """STOPRE: the control reads no further before it is here."""
-        row.stops = True
+    def _alone(self, reader: LineTokens, row: Row) -> None:
+        """SUPA: machine coordinates; STOPRE: the control reads no further before it is here; OVR=: percent of F
+        from here on; DIAMON: X words are diameters, until DIAMOF; RNDM=: a rounding of each move, until RNDM=0."""
+        name, place = reader.peek(-1), reader.place
+        if name == "SUPA":
+            row.words.append(tree.word("G", reader.start + reader.tokens[reader.next - 1].at, 53.0))
+        elif name == "STOPRE":
+            row.stops = True
+        elif name in ("DIAMON", "DIAMOF"):
+            row.before.append(tree.row(place, ("G", 7.0 if name == "DIAMON" else 8.0)))
+        else:
+            reader.expect("=")
+            value = reader.expression()
+            if name == "OVR":
+                row.before.append(tree.row(place, ("M", 220.0), ("S", value)))
+            else:
+                self.rounding = None if value == tree.ZERO else value
 
     def _assumed(self, reader: LineTokens, row: Row) -> None:
         row.before.append(assumed_row(reader.place, tables.SAID[reader.peek(-1)]))
@@ -102,15 +107,6 @@ class BlockWords(Places):
         _skip(reader)
         if {token.text for token in reader.tokens[at + 1 : reader.next]} - {"(", ")", ",", "X", "Y", "Z"}:
             raise reader.fault(tables.refusal("FGROUP"), reader.tokens[at].at)
-
-    def _factor(self, reader: LineTokens, row: Row) -> None:
-        """OVR=: percent of F from here on."""
-        reader.expect("=")
-        row.before.append(tree.row(reader.place, ("M", 220.0), ("S", reader.expression())))
-
-    def _diameters(self, reader: LineTokens, row: Row) -> None:
-        """DIAMON: X words are diameters; DIAMOF ends it."""
-        row.before.append(tree.row(reader.place, ("G", 7.0 if reader.peek(-1) == "DIAMON" else 8.0)))
 
     def _take(self, reader: LineTokens, row: Row, word: tree.Word) -> None:
         """A word of RS274NGC; G40, G41, G42 and G9 are no words of the row."""
@@ -152,10 +148,8 @@ class BlockWords(Places):
             row.words = [word for word in row.words if word.code != f"G{min(taps):g}"]
             given = row.take("XYZIJKS" if 63.0 not in taps else "XYZF")
             lead = next((given.pop(one) for one in "IJK" if one in given), tree.ZERO)
-            ends_at = {
-                axis: self._absolute(axis, value) if axis in AXES else value for axis, value in given.items()
-            }
-            self.body.append(tree.made(place, partial(makers.tap_path, code=min(taps)), lead=lead, **ends_at))
+            tap = partial(makers.tap_path, code=min(taps))
+            self.body.append(tree.made(place, tap, lead=lead, **self._absolutes(given)))
         if row.words or row.assigned:
             self.body.append(tree.Line(place, tuple(row.words), tuple(row.assigned)))
         if row.stops:
@@ -169,10 +163,7 @@ class BlockWords(Places):
         """The arc of CIP or CT, which takes the row's coordinates and feed."""
         if not row.arc:
             raise reader.fault(EACH_LINE, 0)
-        given = {
-            letter: self._absolute(letter, value) if letter in AXES else value
-            for letter, value in row.take("XYZF").items()
-        }
+        given = self._absolutes(row.take("XYZF"))
         self.body.append(tree.made(reader.place, _ARCS[row.arc], **row.through, **given))
 
     def _word(self, reader: LineTokens, name: str, at: int) -> list[tree.Word]:
@@ -186,11 +177,8 @@ class BlockWords(Places):
             value = reader.expression()
             letter = "R" if name == "CR" else "P"
             # the last but one is the tolerance of feed moves; ADISPOS is that of rapid ones
-            return (
-                []
-                if name == "ADISPOS"
-                else [tree.word(letter, at, value + tree.ONE if name == "TURN" else value)]
-            )
+            value = value + tree.ONE if name == "TURN" else value
+            return [] if name == "ADISPOS" else [tree.word(letter, at, value)]
         if name in tables.REFUSED and (number is None or reader.peek() == "="):  # C5 alone is the axis C at 5
             raise reader.fault(tables.refusal(name), at - reader.start)
         spindle = name[1:] if letter in set("SMHTD") and name != letter and number is None else ""
@@ -220,17 +208,14 @@ class BlockWords(Places):
             self.body.append(assumed_row(reader.place, "tool centre feed"))
         if code == 500:
             origin = (("G", 10.0), ("L", 2.0), ("P", 9.0), ("X", 0.0), ("Y", 0.0), ("Z", 0.0))
-            words = tuple(tree.word(letter, at, value) for letter, value in origin)
-            self.body.append(tree.Line(reader.place, words))
+            self.body.append(tree.row(reader.place._replace(at=at), *origin))
         if code in (*_SIDES, 9, *_TAPS, 110, 111, 112, 25, 26):
             return [tree.word("G", at, float(code))]
         if code in (74, 75):
             return self._home(reader, code, at)
         if code not in tables.CODES:
-            raise reader.fault(
-                f"G{code}: no G code of a Sinumerik that is read; write what it does there in other codes",
-                at - reader.start,
-            )
+            text = f"G{code}: no G code of a Sinumerik that is read; write what it does there in other codes"
+            raise reader.fault(text, at - reader.start)
         more = []
         if code >= tables.SYSTEMS_FURTHER + 5 and tables.CODES[code] == (54.1,):
             more = [tree.word("P", at, float(code - tables.SYSTEMS_FURTHER))]
@@ -261,18 +246,13 @@ COMMANDS: dict[str, Callable[[BlockWords, LineTokens, Row], None]] = {
     **dict.fromkeys(_ARCS, BlockWords._arc),
     **dict.fromkeys(CORNERS, BlockWords._corner),
     **dict.fromkeys(
-        (*cycles.ARGUMENTS, "CYCLE800", "CYCLE832"),
-        lambda words, reader, row: words._cycle(reader, reader.peek(-1)),
+        (*cycles.ARGUMENTS, "CYCLE800", "CYCLE832"), lambda words, reader, row: words._cycle(reader)
     ),
     **dict.fromkeys(("AP", "RP"), BlockWords._polar_word),
-    **dict.fromkeys(("DIAMON", "DIAMOF"), BlockWords._diameters),
+    **dict.fromkeys(("SUPA", "STOPRE", "DIAMON", "DIAMOF", "OVR", "RNDM"), BlockWords._alone),
     **dict.fromkeys(
-        (name for one in makers.FRAMES for name in (one, f"A{one}")),
+        (*makers.FRAMES, *(f"A{one}" for one in makers.FRAMES)),
         lambda words, reader, row: words._frame(reader),
     ),
     "FGROUP": BlockWords._feed_axes,
-    "RNDM": BlockWords._rounding,
-    "OVR": BlockWords._factor,
-    "SUPA": BlockWords._machine,
-    "STOPRE": BlockWords._stop_reading,
 }

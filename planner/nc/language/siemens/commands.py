@@ -11,21 +11,20 @@ from functools import partial
 from planner.nc.language import makers, swivel, tree
 from planner.nc.language.siemens import cycles, patterns, tables
 from planner.nc.language.siemens.declarations import Declarations, changed
-from planner.nc.language.siemens.text import LineTokens, handed_over
+from planner.nc.language.siemens.text import TIMES, LineTokens, handed_over
 from planner.nc.language.system_variables import position
 
 _CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
-_TIMES = re.compile(r"P(\d+)")
 _NAMES_MAX = 32  # parameters of a subprogram
-_SYSTEM_OF = {1: 1, 2: 2, 3: 3, 4: 4}  # $P_UIFR[n] is G54 to G57, P of G10 L2
+_SYSTEMS = (1, 2, 3, 4)  # $P_UIFR[n] is G54 to G57, P of G10 L2
 _CLOSER = {"AC": "", "IC": "", "DC": "WRAPPED", "ACP": "TURNED", "ACN": "TURNED"}
 
 
 class Commands(Declarations):
     """Statements of commands: cycles, frames, variables, messages, calls."""
 
-    def _cycle(self, reader: LineTokens, name: str) -> None:
-        place = reader.place
+    def _cycle(self, reader: LineTokens) -> None:
+        name, place = reader.peek(-1), reader.place
         given = self._arguments(reader)
         if name == "CYCLE800":
             values = {f"p{k}": value for k, value in enumerate(given) if value is not None}
@@ -42,10 +41,9 @@ class Commands(Declarations):
         """A cycle, and what it keeps as it was. Raises ProgramFault."""
         place = reader.place
         known = cycles.ARGUMENTS[name]
-        for k, more in enumerate(given[len(known) :]):
+        for k, more in enumerate(given[len(known) :], start=len(known) + 1):
             if more not in (None, tree.ZERO, tree.Number(-0.0)):
-                which = f"argument {len(known) + k + 1} of {name}, of later controls,"
-                raise reader.fault(f"{which} is not read; leave it out", 0)
+                raise reader.fault(f"argument {k} of {name}, of later controls, is not read; leave it out", 0)
         values = {key: value for key, value in zip(known, given, strict=False) if value is not None}
         try:
             cycles.check(name, values)
@@ -88,11 +86,10 @@ class Commands(Declarations):
             if token.text in makers.FRAMES or token.text[0] == "G":
                 reader.next -= 1
                 break
-            letter = "RPL" if token.text == "RPL" and name.endswith("ROT") else token.text[0]
-            single = token.kind == "word" or len(token.text) == len(letter)
-            if letter not in ("X", "Y", "Z", "RPL") or not single:
-                raise reader.fault(f"{name} takes X, Y and Z; {token.text} comes", token.at)
             is_word = token.kind == "word"
+            letter = "RPL" if token.text == "RPL" and name.endswith("ROT") else token.text[0]
+            if letter not in ("X", "Y", "Z", "RPL") or not (is_word or token.text == letter):
+                raise reader.fault(f"{name} takes X, Y and Z; {token.text} comes", token.at)
             value = tree.Number(float(token.text[1:])) if is_word else self._given(reader, letter, at)
             if value is None:
                 raise reader.fault("a text is no length", token.at)
@@ -113,7 +110,7 @@ class Commands(Declarations):
         at = reader.tokens[reader.next - 1].at
         reader.expect("[")
         number, words = reader.expression(), []
-        system = _SYSTEM_OF.get(int(number.value)) if isinstance(number, tree.Number) else None
+        system = int(number.value) if isinstance(number, tree.Number) else 0
         if reader.take(","):
             axis = reader.pop().text
             reader.expect(",")
@@ -129,12 +126,11 @@ class Commands(Declarations):
                 reader.expect(",")
                 words = [(one, old) for one, old in words if one != axis] + [(axis, reader.expression())]
                 reader.take(",")
-        if system is None or part != "TR" or not words or any(axis not in "XYZ" for axis, _ in words):
+        if system not in _SYSTEMS or part != "TR" or not words or any(axis not in "XYZ" for axis, _ in words):
             text = "settable frames are read as $P_UIFR[1 to 4, X, TR] = value and = CTRANS(X, value, ...); put others into "
             raise reader.fault(text + "[work_offsets] of the machine file", at)
-        self.body.append(
-            tree.row(reader.place, ("G", 10.0), ("L", 2.0), ("P", float(system)), *sorted(words))
-        )
+        offset = ("G", 10.0), ("L", 2.0), ("P", float(system))
+        self.body.append(tree.row(reader.place, *offset, *sorted(words)))
 
     def _tool_point(self, reader: LineTokens) -> None:
         """TRAORI and TRAFOOF, alone or as NAME(1). Raises ProgramFault for others, and without kinematics."""
@@ -163,9 +159,8 @@ class Commands(Declarations):
         if letter in "IJK":
             return value - position("XYZ"["IJK".index(letter)]) if kind == "AC" else value
         if letter not in "XYZABC" or (kind not in ("AC", "IC") and letter in "XYZ"):
-            raise reader.fault(
-                "AC and IC stand with X Y Z A B C and I J K; DC, ACP, ACN with A B C", at - reader.start
-            )
+            text = "AC and IC stand with X Y Z A B C and I J K; DC, ACP, ACN with A B C"
+            raise reader.fault(text, at - reader.start)
         here = position(letter)
         if kind in ("DC", "ACP", "ACN"):  # the shortest way there, or that in a direction
             way = here - value if kind == "ACN" else value - here
@@ -179,25 +174,14 @@ class Commands(Declarations):
 
     def _is_call(self, reader: LineTokens) -> bool:
         """True if the line is a call by a name."""
-        name, known = (
-            reader.peek(),
-            self.names.keys() | tables.IDLE | tables.SAID.keys() | tables.REFUSED.keys(),
-        )
-        if reader.kind() != "name" or not _CALLED.fullmatch(name) or name in known:
-            return False
-        behind = reader.peek(1)
-        return name not in cycles.ARGUMENTS and (behind in ("", "(", "P") or bool(_TIMES.fullmatch(behind)))
+        name, behind = reader.peek(), reader.peek(1)
+        known = (self.names, tables.IDLE, tables.SAID, tables.REFUSED, cycles.ARGUMENTS)
+        called = reader.kind() == "name" and _CALLED.fullmatch(name) and not any(name in one for one in known)
+        return bool(called and (behind in ("", "(", "P") or TIMES.fullmatch(behind)))
 
     def _call(self, reader: LineTokens) -> None:
-        name = reader.pop().text
-        times: tree.Expression = tree.ONE
-        given = self._arguments(reader)
-        if match := _TIMES.fullmatch(reader.peek()):
-            reader.pop()
-            times = tree.Number(float(match.group(1)))
-        elif reader.take("P"):
-            reader.expect("=")
-            times = reader.expression()
+        name, given = reader.pop().text, self._arguments(reader)
+        times = reader.times()
         if not reader.ended:
             raise reader.fault(f"{reader.peek()} is not expected behind the call of {name}")
         self._append_call(reader, name, given, times)
@@ -221,21 +205,17 @@ class Commands(Declarations):
         self, reader: LineTokens, name: str, given: list[tree.Expression | None], times: tree.Expression
     ) -> None:
         if name in self.source.harmless:
-            self.body.append(
-                tree.Message(
-                    reader.place,
-                    (f"{name} is assumed not to move anything, as the machine file or --ignore says",),
-                )
-            )
+            text = f"{name} is assumed not to move anything, as the machine file or --ignore says"
+            self.body.append(tree.Message(reader.place, (text,)))
             return
         if len(given) > _NAMES_MAX:
             raise reader.fault(f"a subprogram takes at most {_NAMES_MAX} values", 0)
         place = reader.place
         values = [tree.ZERO if one is None else one for one in given]
         values += [tree.ZERO] * (_NAMES_MAX - len(given) if given else 0)
-        pairs = [(handed_over(k), value) for k, value in enumerate(values)]
-        pairs += [(changed(k), tree.ZERO) for k in range(len(given))]
-        if pairs:
+        if given:
+            pairs = [(handed_over(k), value) for k, value in enumerate(values)]
+            pairs += [(changed(k), tree.ZERO) for k in range(len(given))]
             self.body.append(tree.assign(place, *pairs))
         self.body.append(tree.Call(place, name.lower(), None, name, times))
         for k, one in enumerate(given):

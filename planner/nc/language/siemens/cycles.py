@@ -83,12 +83,8 @@ def check(name: str, given: Mapping[str, tree.Expression]) -> None:
     """Raises ValueError for arguments that CYCLE81 to CYCLE83 lack, and for values of _MORE: they are looked at
     in the text."""
     for key, allowed in _MORE.items():
-        value = given.get(key)
-        if (
-            isinstance(value, tree.Number)
-            and value.value not in allowed
-            and not (key == "VARI" and name not in ("CYCLE84", *RADIAL))
-        ):
+        value, counts = given.get(key), key != "VARI" or name in ("CYCLE84", *RADIAL)
+        if counts and isinstance(value, tree.Number) and value.value not in allowed:
             text = f"{key} {value.value:g} of {name} is not read: it changes what the other arguments mean, or how it is cut; "
             raise ValueError(text + f"read is {' or '.join(map(str, allowed))}")
     if name in _DRILLING:

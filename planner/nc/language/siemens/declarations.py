@@ -5,17 +5,8 @@ import re
 from collections.abc import Sequence
 
 from planner.nc.language import tree
-from planner.nc.language.siemens.text import (
-    ARRAY_VALUES,
-    FILES_WITH_ARRAYS,
-    FIRST_ARRAY,
-    TEXT,
-    LineTokens,
-    Names,
-    SiemensControl,
-    handed_over,
-    variable,
-)
+from planner.nc.language.siemens import text
+from planner.nc.language.siemens.text import TEXT, LineTokens, handed_over, variable
 from planner.nc.language.source import Source
 
 TYPES = frozenset(("REAL", "INT", "BOOL"))
@@ -23,12 +14,12 @@ TEXTS = frozenset(("STRING", "CHAR", "AXIS", "FRAME"))
 _COMPENSATES = re.compile(rb"G4[12]\b")
 
 
-class Declarations(SiemensControl):
+class Declarations(text.SiemensControl):
     """Declared variables, and the state of the text above a line."""
 
     def __init__(self, source: Source):
         super().__init__(source)
-        self.names: Names = {}  # of the variables
+        self.names: text.Names = {}  # of the variables
         self.array_values = 0  # of arrays so far
         self.fastest: tree.Expression | None = None  # speed of the spindle under G96 (LIMS)
         self.handed_back: list[tuple[tree.Parameter, tree.Expression]] = []  # values of PROC at its end
@@ -66,12 +57,14 @@ class Declarations(SiemensControl):
             value = reader.expression() if reader.take("=") else tree.ZERO
             self.body.append(tree.assign(reader.place, (variable(name), value)))
             return
-        count = 1
-        for size in sizes:
-            count *= round(size)
-        if count < 1 or self.array_values + count > ARRAY_VALUES or self.source.file >= FILES_WITH_ARRAYS:
-            raise reader.fault(f"arrays of a file hold at most {ARRAY_VALUES} values here", 0)
-        first = FIRST_ARRAY + self.source.file * ARRAY_VALUES + self.array_values
+        count = math.prod(map(round, sizes))
+        if (
+            count < 1
+            or self.array_values + count > text.ARRAY_VALUES
+            or self.source.file >= text.FILES_WITH_ARRAYS
+        ):
+            raise reader.fault(f"arrays of a file hold at most {text.ARRAY_VALUES} values here", 0)
+        first = text.FIRST_ARRAY + self.source.file * text.ARRAY_VALUES + self.array_values
         self.array_values += count
         self.names[name] = first, tuple(round(size) for size in sizes)
         places = [tree.numbered(first + k) for k in range(count)]
@@ -122,13 +115,9 @@ class Declarations(SiemensControl):
         if not reader.take("("):
             return given
         while not reader.take(")"):
-            if reader.peek() == ",":
-                given.append(None)
-            elif reader.kind() == "text" or self.names.get(reader.peek()) == TEXT:
-                reader.pop()
-                given.append(None)
-            else:
-                given.append(reader.expression())
+            is_text = reader.kind() == "text" or self.names.get(reader.peek()) == TEXT
+            reader.next += is_text
+            given.append(None if is_text or reader.peek() == "," else reader.expression())
             if not reader.take(",") and reader.peek() != ")":
                 raise reader.fault(") is missing")
         return given
@@ -146,15 +135,12 @@ class Declarations(SiemensControl):
                     self._sizes(reader)
                 name = reader.pop().text
                 if kind not in TYPES | TEXTS or not name or reader.peek() in ("[", "="):
-                    text = f"a value of PROC is one of {', '.join(sorted(TYPES | TEXTS))} and a name; arrays and values "
-                    raise reader.fault(text + "that a call may leave out are not read")
+                    kinds = f"a value of PROC is one of {', '.join(sorted(TYPES | TEXTS))} and a name"
+                    raise reader.fault(f"{kinds}; arrays and values that a call may leave out are not read")
                 self.names[name] = TEXT if kind in TEXTS else (0, ())
-                k = len(taken)
+                k, back = len(taken), tree.ONE if by_name else tree.ZERO
                 taken.append((variable(name), handed_over(k)))
-                self.handed_back += [
-                    (handed_over(k), variable(name)),
-                    (changed(k), tree.ONE if by_name else tree.ZERO),
-                ]
+                self.handed_back += [(handed_over(k), variable(name)), (changed(k), back)]
                 if not reader.take(",") and reader.peek() != ")":
                     raise reader.fault(") is missing")
         reader.leave()  # SAVE, DISPLOF and others

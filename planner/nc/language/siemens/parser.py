@@ -16,7 +16,16 @@ from planner.nc.language.siemens.block_words import COMMANDS, EACH_LINE, BlockWo
 from planner.nc.language.siemens.text import LANGUAGE, LineTokens, variable
 from planner.nc.language.source import SourceLine
 from planner.nc.language.system_variables import PositionVariables
-from planner.nc.language.tree import ONE, ZERO, PlainRows, Procedure, ProgramFault, SourcePlace, assign
+from planner.nc.language.tree import (
+    ONE,
+    ZERO,
+    Label,
+    PlainRows,
+    Procedure,
+    ProgramFault,
+    SourcePlace,
+    assign,
+)
 
 _LABEL = re.compile(r"\s*([A-Z_][A-Z0-9_]+)\s*:(?!=)", re.IGNORECASE)
 _TARGETS = re.compile(rb"(?:GOTO[BFC]?|REPEATB?)\s+N(\d{1,9})\b", re.IGNORECASE)
@@ -51,8 +60,13 @@ class SiemensParser(BlockWords):
     def take_plain(self, rows: PlainRows) -> None:
         """Rows of plain words; while a cycle is modal, each that moves is followed by it."""
         one_by_one = range(rows.first - self.source.first_row, rows.last - self.source.first_row)
-        if self.circular:
-            self._check_motion(one_by_one)
+        for row in one_by_one if self.circular else ():  # behind CIP or CT
+            letters, values = self.source.words.of_rows(row)
+            if ((letters == ord("G")) & np.isin(values, (0, 1, 2, 3))).any():
+                self.circular = False
+                break
+            if np.isin(letters, (ord("X"), ord("Y"), ord("Z"))).any():
+                raise self.source.line(row).fault(EACH_LINE)
         letter, value = self.source.words_of(rows)
         codes = value[letter == ord("G")]
         for code in codes[np.isin(codes, _MODES)].tolist():
@@ -71,16 +85,6 @@ class SiemensParser(BlockWords):
             if moves and self.cycle is not None:
                 self.body += self.cycle
 
-    def _check_motion(self, rows: range) -> None:
-        """Plain rows behind CIP or CT: a motion code comes before coordinates. Raises ProgramFault."""
-        for row in rows:
-            letter, value = self.source.words.of_rows(row)
-            if ((letter == ord("G")) & np.isin(value, (0, 1, 2, 3))).any():
-                self.circular = False
-                return
-            if np.isin(letter, (ord("X"), ord("Y"), ord("Z"))).any():
-                raise self.source.line(row).fault(EACH_LINE)
-
     def take_line(self, line: SourceLine) -> None:
         # without the comment; a semicolon in a text is none
         text = re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", line.text.rstrip("\r\n\x1a"))
@@ -92,8 +96,7 @@ class SiemensParser(BlockWords):
             name = label.group(1).upper()
             labels.append(f"N{int(name)}" if name.isdecimal() else name)
             at = label.end()
-        for name in labels:
-            self._label(name, line.place)
+        self.body += [Label(line.place, self._number_of(name)) for name in labels]
         body, first = self.body, len(self.body)
         self._statement(text, at, line)
         if self.body is body:
@@ -129,7 +132,7 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], object]] = {
     "REPEATB": SiemensParser._repeat_block,
     "UNTIL": SiemensParser._until,
     **dict.fromkeys(
-        ("GOTO", "GOTOF", "GOTOB", "GOTOC"), lambda parser, reader: parser._jump(reader, parser.body)
+        ("GOTO", "GOTOF", "GOTOB", "GOTOC"), lambda parser, reader: parser.body.append(parser._jump(reader))
     ),
     "MCALL": SiemensParser._modal_call,
     **dict.fromkeys(patterns.PATTERNS, SiemensParser._pattern),
@@ -143,11 +146,7 @@ _STATEMENTS: dict[str, Callable[[SiemensParser, LineTokens], object]] = {
     "$P_UIFR": SiemensParser._offset,
     **dict.fromkeys(("RET", "STOPFROM"), SiemensParser._return),
     **dict.fromkeys(
-        (
-            one
-            for one in tables.REFUSED
-            if one not in COMMANDS and (one[0] not in "ABCG" or not one[1:].isdecimal())
-        ),
+        filter(re.compile(r"(?![ABCG]\d+\Z)").match, tables.REFUSED.keys() - COMMANDS.keys()),
         SiemensParser._refused,
     ),
 }

@@ -99,9 +99,8 @@ class Places(Commands):
         if reader.take("FP"):
             reader.expect("=")
             if reader.expression() != tree.ONE:
-                raise reader.fault(
-                    "G75 FP other than 1 is not read; write its position with SUPA", at - reader.start
-                )
+                text = "G75 FP other than 1 is not read; write its position with SUPA"
+                raise reader.fault(text, at - reader.start)
         words = [(axis, tree.ZERO) for axis in axes]
         self.body.append(tree.row(reader.place, ("G", 91.0), ("G", 28.0 if code == 74 else 30.0), *words))
         return [tree.word("G", at, 90.0 if self.absolute else 91.0)]
@@ -117,5 +116,7 @@ class Places(Commands):
         else:
             raise reader.fault("G4 is followed by F and seconds, or S and turns of the spindle", 0)
 
-    def _absolute(self, axis: str, given: tree.Expression) -> tree.Expression:
-        return given if self.absolute else position(axis) + given
+    def _absolutes(self, given: dict[str, tree.Expression]) -> dict[str, tree.Expression]:
+        """The values with those of axes as absolute ones."""
+        relative = "" if self.absolute else AXES
+        return {c: position(c) + value if c in relative else value for c, value in given.items()}

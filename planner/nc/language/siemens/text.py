@@ -34,10 +34,9 @@ LANGUAGE = tree.Language(
     operations=ARITHMETIC
     | {
         ("MOD", 2): "fmod({0},{1})",
-        **{
-            (f"B_{name}", 2): f"float(int({{0}}){sign}int({{1}}))"
-            for name, sign in (("AND", "&"), ("OR", "|"), ("XOR", "^"))
-        },
+        ("B_AND", 2): "float(int({0})&int({1}))",
+        ("B_OR", 2): "float(int({0})|int({1}))",
+        ("B_XOR", 2): "float(int({0})^int({1}))",
         ("BOUND", 3): "min(max({0},{1}),{2})",
         ("INDEX", 2): "array_index({0},{1})",
         ("WRAPPED", 1): "remainder({0},360.0)",
@@ -53,6 +52,7 @@ LANGUAGE = tree.Language(
 )
 # Functions of several values, by their names in the tree.
 _MORE = {"ATAN2": "ATAN", "MIN": "MIN", "MAX": "MAX", "MINVAL": "MIN", "MAXVAL": "MAX", "BOUND": "BOUND"}
+TIMES = re.compile(r"P(\d+)")
 _SYSTEM = re.compile(r"\$(?:AA_IW|AA_IM|P_EP|AA_IB)\Z")
 
 
@@ -90,9 +90,8 @@ class LineTokens(TokenReader):
         super().__init__(text)
 
     def fault(self, message: str, at: int | None = None) -> tree.ProgramFault:
-        return tree.ProgramFault(
-            self.place._replace(at=self.start + (self.column() if at is None else at)), message
-        )
+        column = self.column() if at is None else at
+        return tree.ProgramFault(self.place._replace(at=self.start + column), message)
 
     def leave(self) -> None:
         """Go past all that is left."""
@@ -102,16 +101,23 @@ class LineTokens(TokenReader):
         """Byte offset of the next token."""
         return self.start + self.column()
 
+    def times(self) -> tree.Expression:
+        """How often: P3 or P=expression, 1 if none of them comes."""
+        if match := TIMES.fullmatch(self.peek()):
+            self.pop()
+            return tree.Number(float(match[1]))
+        if not self.take("P"):
+            return tree.ONE
+        self.expect("=")
+        return self.expression()
+
     def value(self) -> tree.Expression:
         if self.kind() == "word":  # is a variable, or one and a sum: A+1
-            word = self.tokens[self.next]
-            split = 1 if word.text[1:2] in ("+", "-") else len(word.text)
-            parts = [Token("name", word.text[:split], word.at)]
-            if split == 1:
-                parts += [
-                    Token("sign", word.text[1], word.at + 1),
-                    Token("number", word.text[2:], word.at + 2),
-                ]
+            _, text, at = self.tokens[self.next]
+            parts = [Token("name", text, at)]
+            if text[1] in "+-":
+                parts = [Token("name", text[0], at), Token("sign", text[1], at + 1)]
+                parts.append(Token("number", text[2:], at + 2))
             self.tokens[self.next : self.next + 1] = parts
         return super().value()
 
@@ -143,11 +149,10 @@ class LineTokens(TokenReader):
             if axis not in POSITIONS or not axis:
                 raise self.fault(f"{name}[{axis}]: the position of {', '.join(POSITIONS)} is known", token.at)
             return position(axis)
-        parameter = self.parameter(token)
-        if parameter is None and name[0] == "$":
-            raise self.fault(f"{name} is known by the control only; write its value", token.at)
-        if parameter is None:
-            raise self.fault(f"{name} is not declared; write DEF REAL {name} before", token.at)
+        if (parameter := self.parameter(token)) is None:
+            of_control = "is known by the control only; write its value"
+            why = of_control if name[0] == "$" else f"is not declared; write DEF REAL {name} before"
+            raise self.fault(f"{name} {why}", token.at)
         return parameter
 
     def parameter(self, token: Token) -> tree.Numbered | tree.Named | None:
@@ -167,9 +172,8 @@ class LineTokens(TokenReader):
         if not first:
             return None if sizes else variable(token.text)
         if not self.take("["):
-            raise self.fault(
-                f"{token.text} is an array; write which of its values: {token.text}[0]", token.at
-            )
+            text = f"{token.text} is an array; write which of its values: {token.text}[0]"
+            raise self.fault(text, token.at)
         value: tree.Expression = tree.ZERO
         for k, size in enumerate(sizes):
             if k:
@@ -190,9 +194,6 @@ class SiemensControl(LineParser):
         # where the statements of lines with labels stand: a body, and the first and behind the last of them
         self.lines: dict[str, tuple[list[tree.Statement], int, int]] = {}
 
-    def _label(self, name: str, place: tree.SourcePlace) -> None:
-        self.body.append(tree.Label(place, self._number_of(name)))
-
     def _number_of(self, label: str) -> int:
         return self.labels.setdefault(label, len(self.labels) + 1)
 
@@ -208,9 +209,7 @@ class SiemensControl(LineParser):
         condition = reader.expression()
         if reader.peek().startswith("GOTO"):
             reader.pop()
-            body: list[tree.Statement] = []
-            self._jump(reader, body)
-            self.body.append(tree.If(reader.place, ((condition, body),), []))
+            self.body.append(tree.If(reader.place, ((condition, [self._jump(reader)]),), []))
         else:
             self._begin("IF", reader, condition)
 
@@ -221,8 +220,8 @@ class SiemensControl(LineParser):
         self.body = self.open[-1].body
 
     def _end_if(self, reader: LineTokens) -> None:
-        branch = self._close("IF", reader)
-        self.body.append(branch.branched())
+        branch = self._close("IF", reader).branched()
+        self.body.append(branch)
 
     def _end_loop(self, reader: LineTokens) -> None:
         closed = self._close(reader.peek(-1).removeprefix("END"), reader)
@@ -277,9 +276,8 @@ class SiemensControl(LineParser):
                 raise reader.fault(f"there is no label {name} above this line", 0)
         body, begin, end = *self.lines[first][:2], self.lines[last][2]
         found: list[tree.Statement] = [one for one in body[begin:end] if not isinstance(one, tree.Label)]
-        if body is not self.lines[last][0] or any(
-            isinstance(s, tree.Goto) for s in tree.statements_in(found)
-        ):
+        jumps = any(isinstance(one, tree.Goto) for one in tree.statements_in(found))
+        if jumps or body is not self.lines[last][0]:
             raise reader.fault(f"lines {first} to {last} jump, or lie in different loops; write them out", 0)
         return found
 
@@ -299,13 +297,7 @@ class SiemensControl(LineParser):
             raise reader.fault(f"there is no label {label} above this line", 0)
         if reader.peek() in self.labels:
             last = reader.pop().text
-        times: tree.Expression = tree.ONE
-        if match := re.fullmatch(r"P(\d+)", reader.peek()):
-            times = tree.Number(float(match[1]))
-            reader.pop()
-        elif reader.take("P"):
-            reader.expect("=")
-            times = reader.expression()
+        times = reader.times()
         self.counters += 1
         return label, last, variable(f"_count{self.counters - 1}"), times
 
@@ -313,11 +305,11 @@ class SiemensControl(LineParser):
         closed = self._close("REPEAT", reader)
         self.add_loop(closed, tree.op("NOT", reader.expression()), "do")
 
-    def _jump(self, reader: LineTokens, body: list[tree.Statement]) -> None:
+    def _jump(self, reader: LineTokens) -> tree.Goto:
         if reader.ended:
             raise reader.fault("a label is expected here")
         label = reader.pop().text.strip('"').upper()
-        body.append(tree.Goto(reader.place, tree.Number(float(self._number_of(label)))))
+        return tree.Goto(reader.place, tree.number(self._number_of(label)))
 
     def _case(self, reader: LineTokens) -> None:
         """CASE value OF 1 GOTOF label ... DEFAULT GOTOF label."""
@@ -326,13 +318,13 @@ class SiemensControl(LineParser):
         branches: list[tuple[tree.Expression, list[tree.Statement]]] = []
         otherwise: list[tree.Statement] = []
         while not reader.ended:
-            body: list[tree.Statement] = []
-            if not reader.take("DEFAULT"):
-                branches.append((tree.op("EQ", value, reader.value()), body))
-            else:
-                otherwise = body
+            condition = None if reader.take("DEFAULT") else tree.op("EQ", value, reader.value())
             if not reader.peek().startswith("GOTO"):
                 raise reader.fault("GOTOF or GOTOB and a label are expected here")
             reader.pop()
-            self._jump(reader, body)
+            body: list[tree.Statement] = [self._jump(reader)]
+            if condition is None:
+                otherwise = body
+            else:
+                branches.append((condition, body))
         self.body.append(tree.If(reader.place, tuple(branches), otherwise))

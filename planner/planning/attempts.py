@@ -70,12 +70,21 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
         return Tried(steps=steps)
     if led is job and steps > CHEAP and first.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
         job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
-        return Tried(steps=steps, left=False)
-    kept = cache(partial(kept_on_path, settings=settings))
+        return Tried(steps=steps, left=False, laid=first.laid)
+    laid = first.laid if led is job else None
+    kept = cache(partial(kept_on_path, settings=settings, laid=laid))
     found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings, kept))
     joint = found.plan is not None
     began = first.solution.cycle_time
-    return Tried(best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower, began=began)
+    return Tried(
+        best=found.plan,
+        kept=kept,
+        joint=joint,
+        steps=found.steps,
+        slower=found.slower,
+        began=began,
+        laid=None if joint else laid,
+    )
 
 
 def _in_motion(job: Job, settings: Settings, tried: Tried) -> Tried:
@@ -84,8 +93,8 @@ def _in_motion(job: Job, settings: Settings, tried: Tried) -> Tried:
 
     asked, led = is_searched(job, settings), with_leads(job)
     tried = _joint(job, settings, tried) if asked else tried
-    if tried.best is not None or tried.slower is not None:
-        return dataclasses.replace(tried, best=tried.best or tried.slower)
+    if tried.plan is not None:
+        return tried
     first = first_motion(led, settings) if asked else None
     why = SEARCHED_ONLY if first is None else why_not(between_leads(first.motion(), job, led), job)
     none = job.plan(
@@ -122,18 +131,18 @@ def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether there is no plan yet, or the motion on the path takes less time, as far as it is known and the
-    search was for the least, or may behind long filters."""
-    if filters_count(*job.real):
+    """Whether there is no plan yet, not even one that is run slower in places, or the motion on the path takes less time, as
+    far as it is known and the search was for the least, or may behind long filters."""
+    if filters_count(*job.real) or tried.plan is None:
         return True
     before = tried.began if tried.path is None else tried.path[1].end
-    sooner = before < (1.0 - SAME_TIME) * counted_time(tried.best)
-    return tried.best is None or (sooner and not settings.effort.search.smooth)
+    sooner = before < (1.0 - SAME_TIME) * counted_time(tried.plan)
+    return sooner and (tried.best is None or not settings.effort.search.smooth)
 
 
 def _on_path(job: Job, settings: Settings, tried: Tried) -> Tried:
     """The motion on the path, delivered."""
-    plan = plan_on_path(job, settings, tried.path)
+    plan = plan_on_path(job, settings, tried.path, tried.laid)
     joint = tried.joint and tried.best is not None and faster(tried.best, plan) is tried.best
     best = plan if tried.best is None else faster(tried.best, plan)
     return dataclasses.replace(tried, best=best, path=None, joint=joint)
@@ -144,14 +153,14 @@ def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bo
     on a path of a job that is not long."""
     if settings.corner != AUTO or (tried.joint and settings.effort.search.smooth):
         return False
-    stops_sooner = job.line_stop_time < counted_time(tried.best)
-    only_on_path = not tried.joint or filters_count(*job.real)
+    stops_sooner = job.line_stop_time < counted_time(tried.plan)
+    only_on_path = (tried.best is not None and not tried.joint) or filters_count(*job.real)
     return stops_sooner or (only_on_path and len(job.toolpath) <= KINEMATIC_MOST)
 
 
 def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:
     """Method kinematic, and where it does not pass full stops at all blocks but lines that go straight on."""
-    best = tried.best
+    best = tried.plan
     limits = Limits.of(job.machine, job.toolpath.axes)
     if np.isinf([limits.tangential, limits.tangential_jerk]).all():  # which its corners do not keep
         rival = KinematicMethod().plan_job(job.faster_than(counted_time(best)))

@@ -110,9 +110,9 @@ def joint_plan(
     """
     stays, led = motion is not None, with_leads(job)
     with job.stage("search") as report:
-        start = Start(motion or between_leads(planned.motion(), job, led), job, search.cut)
         runs = list(tube_runs_of(job.toolpath, job.machine, jerk_limited=settings.order.jerk_limited))
-        steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
+        start = Start(motion or between_leads(planned.motion(), job, led), job, runs, search.cut)
+        steps = sum(map(len, start.guesses))
         most = search.steps_max
         if steps > search.small:  # no finer than what is delivered
             most = min(most, start.motion.end / job.machine.dt)
@@ -224,7 +224,7 @@ def searched_runs(
     runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
 ) -> list[FoundRun]:
     """The solution on each run."""
-    size = np.array([len(start.guess(k, run)) for k, run in enumerate(runs)])
+    size = np.array([len(guess) for guess in start.guesses])
     order, done = np.argsort(-size, kind="stable").tolist(), np.zeros(len(runs))  # shares
 
     def one(k: int) -> Searching[FoundRun]:
@@ -247,7 +247,7 @@ def search_run(
     if isinstance(solver, InTwo):
         taken = yield from _in_two(k, run, start, solver)
     else:
-        guess = start.guess(k, run)
+        guess = start.guesses[k]
         taken = [(guess, (yield from search_with(solver, run, guess)))]
     found = FoundRun(run, Status.ACCEPTABLE, taken[-1][1].sentence)
     for guess, solution in taken:
@@ -266,13 +266,13 @@ def search_run(
 
 def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> Searching[list[tuple[Guess, TubeSolution]]]:
     """The steps from which each search began whose motion was taken, and its solution, the last one in the shortest steps."""
-    guess = start.guess(k, run)
+    guess = start.guesses[k]
     found = yield from solver.first.search(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
         if not solver.finer:
             return [(guess, found)]
         cut, own = solver.finer[0]
-        guess = start.guess_in(k, run, cut)
+        (guess,) = start.cut(k, [run], cut)
         return [(guess, (yield from own.search(run, guess)))]
     taken = [(guess, found)]
     for cut, own in solver.finer:

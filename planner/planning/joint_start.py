@@ -1,60 +1,52 @@
 """Where the joint search begins: a motion, and the steps into which it is cut along each run."""
 
-import dataclasses
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
+from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guesses_from
 from planner.joint.run import TubeRun
 from planner.motion.timing import MotionInTime
-from planner.motion.trajectory import Trajectory
 from planner.planning.job.by_run import RunsInTime
 from planner.planning.job.job import Job
 
 # Times nearer to each other than this share of a leg's mean time are one [-].
 LEAST_APART = 1e-6
+TOGETHER = 1000  # legs of short runs that are cut together: what is known of their steps stays in a processor's cache
 
 
 class Start(RunsInTime):
     """A motion from which the search begins, and where in it the runs are.
 
-    cut : how finely it is cut into steps
+    guesses : the motion along each run, cut into steps as finely as `cut` says
     """
 
-    def __init__(self, motion: MotionInTime, job: Job, cut: Cut = DEFAULT_CUT):
+    def __init__(self, motion: MotionInTime, job: Job, runs: Sequence[TubeRun], cut: Cut = DEFAULT_CUT):
         super().__init__(motion, job)
-        self.cut = cut
-        self._guesses: dict[int, Guess] = {}
+        size = np.cumsum([len(run) for run in runs])
+        edges = np.searchsorted(size, np.arange(0, size[-1], TOGETHER), side="right")
+        parts = [runs[begin:end] for begin, end in pairwise([*np.unique(edges).tolist(), len(runs)])]
+        first = np.cumsum([0, *map(len, parts)]).tolist()
+        self.guesses = [
+            guess for at, part in zip(first, parts, strict=False) for guess in self.cut(at, part, cut)
+        ]
 
     def forget(self) -> None:
         """Let go of what only a search needs: half a kilobyte a step."""
-        self._guesses.clear()
+        self.guesses.clear()
         vars(self).pop("seen", None)
 
-    def guess(self, k: int, run: TubeRun) -> Guess:
-        """The motion along run k, cut into steps."""
-        if k not in self._guesses:
-            self._guesses[k] = self.guess_in(k, run, self.cut)
-        return self._guesses[k]
+    def cut(self, first: int, runs: Sequence[TubeRun], cut: Cut) -> list[Guess]:
+        """The motion along the runs from the first one on, cut into steps; exact at the nodes, so that parts of it can
+        stay."""
+        times = [self._passed(first + k, run) for k, run in enumerate(runs)]
+        return guesses_from(runs, self.seen, times, cut, lambda t: self.motion.at(t, 1.0))
 
-    def guess_in(self, k: int, run: TubeRun, cut: Cut) -> Guess:
-        """The motion along run k, cut into steps; exact at the nodes, so that parts of it can stay."""
-        guess = guess_from(run, *self.window(k, run), cut)
-        inner = self.departure[k] + np.cumsum(guess.h[:-1])
-        seen = self.motion.at(inner, 1.0)
-        state = guess.state.copy()
-        for m, name in enumerate(("position", "velocity", "acceleration")):
-            state[1:-1, m] = getattr(seen, name)[:, run.axis]
-        return dataclasses.replace(guess, state=state)
-
-    def window(self, k: int, run: TubeRun) -> tuple[Trajectory, FloatArray]:
-        """The motion along run k, and when it passes the run's vertices (R+1,) [s]."""
+    def _passed(self, k: int, run: TubeRun) -> FloatArray:
+        """(R+1,) when the motion passes the vertices of run k [s]."""
         begin, end = self.departure[k], self.arrival[k + 1]
-        inside = np.searchsorted(self.seen.t, [begin, end])
-        window = slice(inside[0], inside[1] + 1)
-        columns = {name: getattr(self.seen, name)[window] for name in self.seen.columns}
-        along = dataclasses.replace(self.seen, **columns)
         t = np.clip(self.times[run.first], begin, end)
         t[[0, -1]] = begin, end
         # Blocks whose ends the motion is nearest to at the same time share the time of their neighbours.
@@ -62,4 +54,4 @@ class Start(RunsInTime):
         seen = np.append(True, np.diff(t) > apart)
         seen[1:] &= t[1:] < end - apart
         seen[-1] = True
-        return along, np.interp(run.offset, run.offset[seen], t[seen])
+        return t if seen.all() else np.interp(run.offset, run.offset[seen], t[seen])

@@ -179,8 +179,8 @@ def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan
         if attempt.applies(job, settings, tried):
             job.tell(attempt.name)
             tried = attempt.make(job, settings, tried)
-    assert tried.best is not None
-    return tried.best if tried.slower is None else beside(tried.best, tried.slower, job)
+    assert tried.plan is not None
+    return tried.plan if tried.slower is None or tried.best is None else beside(tried.best, tried.slower, job)
 
 
 def _runs_alone(job: Job, made: Plan, method: Method) -> Plan | None:

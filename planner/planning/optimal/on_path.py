@@ -15,6 +15,7 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.sampling.samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution
 from planner.motion.timing import Motion, law_of_solution
+from planner.planning.optimal.geometry import Laid
 from planner.smoothing.spline_path import SplineShape
 
 
@@ -26,9 +27,15 @@ class OnPath:
     samples: PathSamples  # its grid
     problem: FeedrateProblem  # the feedrate problem on the grid
     solution: FeedrateSolution  # the motion, or the status of a failure
-    # what the path's splines are made of, if it has some
+    # what the path's splines are made of, and the path with rounded corners they were laid on, if it has some
     shape: SplineShape | None = None
+    rounded: SmoothPath | None = None
     notes: tuple[str, ...] = ()  # sentences on what was given up
+
+    @property
+    def laid(self) -> Laid | None:
+        """As of `splined_with_stops` (geometry.py)."""
+        return None if self.rounded is None or self.shape is None else (self.rounded, self.shape)
 
     def faster_than(self, other: OnPath) -> bool:
         """True if this motion was found and takes less time than another that was found."""

@@ -22,10 +22,11 @@ from planner.motion.timing import Motion
 from planner.planning.job.job import Job
 from planner.planning.job.made import Tables
 from planner.planning.job.plan import Plan
+from planner.planning.job.trace import Tell, tell_nobody
 from planner.planning.optimal.behind_filters import within_filters
 from planner.planning.optimal.compare_corners import corner_bounds, with_corners
 from planner.planning.optimal.effort import COARSE, EFFORTS, Grids, Settings
-from planner.planning.optimal.geometry import corner_shape, splined_with_stops
+from planner.planning.optimal.geometry import Laid, corner_shape, splined_with_stops
 from planner.planning.optimal.notes import no_spline_note, not_compared_note
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.result import plan_of_solution, priced
@@ -33,10 +34,13 @@ from planner.planning.optimal.tighten import within_limits
 from planner.smoothing.spline_path import with_spline
 
 
-def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
-    """The time-optimal motion on a smooth path, its limits kept between grid points too; None if none."""
+def kept_on_path(job: Job, settings: Settings, laid: Laid | None = None) -> tuple[OnPath, Motion] | None:
+    """The time-optimal motion on a smooth path, its limits kept between grid points too; None if none.
+
+    laid : its splines, if they have been laid (`OnPath.laid`)
+    """
     try:
-        found = time_optimal(job, settings)
+        found = time_optimal(job, settings, laid)
     except NotSolvedError:  # no grid follows the path
         return None
     if not found.solution.solved:
@@ -45,14 +49,17 @@ def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
         return within_limits(found, settings.order, job.toolpath, job.machine, job.tell)
 
 
-def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | None = None) -> Plan:
+def plan_on_path(
+    job: Job, settings: Settings, known: tuple[OnPath, Motion] | None = None, laid: Laid | None = None
+) -> Plan:
     """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points,
     delivered; without a trajectory if it takes longer than `job.most`.
 
     known : its motion, if there is one already (`kept_on_path`)
+    laid  : as there
     """
     try:
-        found = [known[0] if known else time_optimal(job, settings)]
+        found = [known[0] if known else time_optimal(job, settings, laid)]
     except NotSolvedError as fault:  # no grid follows the path
         return job.plan(
             None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0, sentence=str(fault)
@@ -75,17 +82,17 @@ def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | No
     return plan_of_solution(job, best, made._replace(filtered=filtered), settings, tables)
 
 
-def time_optimal(job: Job, settings: Settings) -> OnPath:
-    """The time-optimal motion, limits kept at grid points, on rounded corners or on splines."""
+def time_optimal(job: Job, settings: Settings, laid: Laid | None = None) -> OnPath:
+    """The time-optimal motion, limits kept at grid points, on rounded corners or on splines; `laid`: as above."""
     order, machine = settings.order, job.machine
 
     # Geometry: corners rounded each by itself, or splines in their place; a full stop where a run gets none.
-    given = _rounded(job, settings)
     if settings.corner not in (AUTO, SPLINE):
+        given = _rounded(job, settings)
         return order.solve(given, job, grids_for(given, job, settings).final)
-    with job.stage("geometry"):
-        rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
+    rounded, splines = laid or _splined(job, settings, job.tell)
     if not splines.splines.fits.any():
+        given = _rounded(job, settings)
         cornered = order.solve(given, job, grids_for(given, job, settings).final)
         return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
@@ -108,9 +115,7 @@ def first_motion(job: Job, settings: Settings) -> OnPath | None:
     """The time-optimal motion on splines, on a coarse grid and with its limits kept at grid points
     only, with a full stop where a run gets none; None where no run has one, where there is no solution, and
     where the splines have more spans than the steps that are searched."""
-    given = _rounded(job, settings)
-    with job.stage("geometry"):
-        rounded, shape = splined_with_stops(given, job.machine, settings.order.jerk_limited)
+    rounded, shape = _splined(job, settings)
     fits = shape.splines.fits
     if (len(fits) and not fits.any()) or shape.splines.span_first[-1] > settings.effort.search.steps_max:
         return None
@@ -118,7 +123,9 @@ def first_motion(job: Job, settings: Settings) -> OnPath | None:
         planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
     except NotSolvedError:  # no grid follows the splines
         return None
-    return planned.without_prices() if planned.solution.solved else None
+    if not planned.solution.solved:
+        return None
+    return dataclasses.replace(planned.without_prices(), shape=shape, rounded=rounded)
 
 
 def _rounded(job: Job, settings: Settings) -> SmoothPath:
@@ -126,6 +133,13 @@ def _rounded(job: Job, settings: Settings) -> SmoothPath:
     with job.stage("geometry"):
         shape = corner_shape(settings.corner, job.machine, job.toolpath, settings.bezier)
         return round_corners(job.toolpath, job.machine, shape, blend_tangents=settings.order.jerk_limited)
+
+
+def _splined(job: Job, settings: Settings, tell: Tell = tell_nobody) -> Laid:
+    """Splines over the runs between full stops."""
+    given = _rounded(job, settings)
+    with job.stage("geometry"):
+        return splined_with_stops(given, job.machine, settings.order.jerk_limited, tell)
 
 
 def grids_for(path: SmoothPath, job: Job, settings: Settings) -> Grids:

@@ -98,15 +98,6 @@ class Seen(NamedTuple):
     jerk: FloatArray
 
 
-def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut = DEFAULT_CUT) -> Guess:
-    """Cut a motion along a run of R legs into steps.
-
-    motion      : at the ends of the run the run's velocities are put in its place
-    vertex_time : (R+1,) when it passes the vertices [s], strictly ascending
-    """
-    return guesses_from([run], motion, [vertex_time], cut)[0]
-
-
 def guesses_from(
     runs: Sequence[TubeRun],
     motion: Trajectory,
@@ -114,7 +105,12 @@ def guesses_from(
     cut: Cut = DEFAULT_CUT,
     exact: Callable[[FloatArray], Trajectory] | None = None,
 ) -> list[Guess]:
-    """The same of runs that follow one another; exact: the motion at any times, for the states at the nodes."""
+    """Cut a motion along runs that follow one another into steps, each by itself; at their ends the runs' velocities are put in
+    its place.
+
+    vertex_times : (R+1,) of each run when it passes the vertices [s], strictly ascending
+    exact        : the motion at any times, for the states at the nodes
+    """
     steps = [_steps(run, motion, times, cut) for run, times in zip(runs, vertex_times, strict=True)]
     shapes, which = together(runs, len(motion.axes)), np.arange(len(runs))
     count, legs = np.array([len(leg) for leg, _ in steps]), np.array([len(run) for run in runs])
@@ -129,7 +125,7 @@ def guesses_from(
     for k, run in enumerate(runs):
         moves[k, run.axis] = 1.0
         rest = np.stack([run.vertex[[0, -1]], run.ends, 0.0 * run.ends], axis=1)
-        state[np.ix_([first[k], last[k]], range(3), run.axis)] = rest
+        state[first[k] : last[k] + 1 : count[k], :, run.axis] = rest
     h = nodes[node + 1] - nodes[node]
     of_axes = state * moves[np.repeat(which, count + 1), None]
     passed, offset = (

@@ -108,18 +108,14 @@ class TubeRun(LegShapes):
         freeze(self, "axis", np.int64, (axes,))
         freeze(self, "first", np.int64, (legs + 1,))
         freeze(self, "curve", np.int64, (legs,))
-        for name in ("length", "radius", "rate", "curvature", "budget"):
-            freeze(self, name, np.float64, (legs,))
-        for name in ("feed", "across_max"):
-            freeze(self, name, np.float64, (legs,), finite=False)
-        for name in ("base", "drift", "e1", "e2"):
-            freeze(self, name, np.float64, (legs, axes))
+        freeze(self, "length radius rate curvature budget", np.float64, (legs,))
+        freeze(self, "feed across_max", np.float64, (legs,), finite=False)
+        freeze(self, "base drift e1 e2", np.float64, (legs, axes))
         freeze(self, "vertex", np.float64, (legs + 1, axes))
         freeze(self, "vertex_budget", np.float64, (legs + 1,))
         freeze(self, "ends", np.float64, (2, axes))
         freeze(self, "lag", np.float64, (None, 2))
-        for name in ("velocity", "acceleration", "counts"):
-            freeze(self, name, np.float64, (axes,))
+        freeze(self, "velocity acceleration counts", np.float64, (axes,))
         freeze(self, "jerk", np.float64, (axes,), finite=False)
         freeze(self, "word", np.float64, (legs, None), finite=False)
 

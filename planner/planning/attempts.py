@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from planner.corners.budget import filters_count
 from planner.feedrate.constraints.limits import Limits
 from planner.feedrate.solution import Status
 from planner.geometry.legs import legs_of
-from planner.planning.attempt import Attempt, Tried
 from planner.planning.job.choice import better, counted_time, faster
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
@@ -29,7 +28,7 @@ from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.stop import StopMethod
 from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.path_motion import first_motion, kept_on_path, plan_on_path
-from planner.planning.page import best_of, tolerant
+from planner.planning.page import Attempt, Tried, best_of, tolerant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -185,54 +184,6 @@ ALONE, ON_PATH = ATTEMPTS[1:], ATTEMPTS[2:]
 def attempts_at(job: Job) -> tuple[Attempt, ...]:
     """The attempts for a job: one alone makes motions that do not begin or do not end at rest."""
     return IN_MOTION if any(job.toolpath.speeds) else ATTEMPTS
-
-
-class Retry(NamedTuple):
-    """Something that is tried once more, or in another way.
-
-    steps : in the trace, as they begin
-    when  : and what
-    most  : at most so often
-    worth : how much longer plans are without it, on the mean and at worst [-], or what it saves from failing
-    """
-
-    steps: tuple[str, ...]
-    when: str
-    most: str
-    worth: str
-
-
-# All that is tried once more. `python -m benchmarks.net.ablation ROWS --net NET --without STEP` plans without
-# it, on jobs of NET where it shows. Worth by these switches on those of 386 random jobs by the default
-# (jobs/random_lines.py 0 to 329, campaign 7000000 to 7000059) where they show and that plan fastest, 5 to 32 each:
-# runs alone, closed form, tighten, less for the period, slower in places; of the share of tolerance on 16 behind
-# filters. That of the search, once more, on 106 programs of benchmarks/judge/feed_promise.py, whose F changes at every
-# block; of the others by benchmarks/results/ablation.md.
-RETRIES = (
-    Retry(
-        ("search, once more",),
-        "the search has not ended: from a motion that stays where it fails",
-        "1",
-        "2e-2, 1.2",
-    ),
-    Retry(("runs alone",), "runs are not found, or the verdict finds something on few", "3", "1e-2, 2e-1"),
-    Retry(("closed form",), "there is but a motion on a path, or full stops are sooner", "2", "2e-2, 2e-1"),
-    Retry(("splines",), "full stops where a run gets no spline", "2", "3e-5, 6e-4"),
-    Retry(("corners",), "single ones between full stops, where they may be faster", "2", "2e-3, 2e-2"),
-    Retry(("tighten",), "limits, where they are exceeded between grid points", "2", "3e-5, 5e-4"),
-    Retry(("filters",), "less feed where the tolerance is left behind filters", "16", "5e-1, 3"),
-    Retry(("share of tolerance",), "behind long filters, less for the path", "2", "3e-3, 4e-2"),
-    Retry(
-        ("less for the period",), "chords between samples leave the tolerance", "8", "1e-1, 2e-1; saves plans"
-    ),
-    Retry(("slower in places",), "the verdict finds something", "6", "2e-2, 2e-1"),
-    Retry(
-        ("shaped",),
-        "a shaper that takes more than the tolerance: more limits, less tolerance; at last gently",
-        "5, 1",
-        "1e-1, 3e-1",
-    ),
-)
 
 
 def _others(

@@ -34,15 +34,14 @@ from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
 from planner.planning.job.by_run import RunsInTime, full_stops
 from planner.planning.job.job import Job
-from planner.planning.job.made import NO_TABLES, Delivered, Tables
-from planner.planning.job.plan import Plan
+from planner.planning.job.plan import NO_TABLES, Delivered, Plan, Tables
 from planner.planning.job.runs_alone import ALONE_MOST, Alone, with_runs_alone
 from planner.planning.joint_leads import between_leads, with_leads
 from planner.planning.joint_start import Start
 from planner.planning.optimal.effort import Search, Settings
 from planner.planning.optimal.notes import path_notes
 from planner.planning.optimal.on_path import OnPath
-from planner.planning.optimal.result import priced
+from planner.planning.optimal.path_motion import priced
 from planner.sensitivity.activity import history
 from planner.sensitivity.found_activity import found_history
 from planner.sensitivity.found_prices import found_prices

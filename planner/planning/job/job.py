@@ -28,9 +28,8 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import MotionInTime, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
-from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.notes import job_notes
-from planner.planning.job.plan import Making, Plan
+from planner.planning.job.plan import NO_TABLES, Delivered, Making, Plan, Tables
 from planner.planning.job.stages import Stages
 from planner.planning.job.trace import Tell
 from planner.verifier import OF_CHORDS, verify

@@ -20,8 +20,7 @@ from planner.joint.solvers import TubeSolver, tube_solver
 from planner.joint.splice import Spliced
 from planner.nc.program import Program
 from planner.planning.job.job import Job
-from planner.planning.job.made import Delivered
-from planner.planning.job.plan import Plan
+from planner.planning.job.plan import Delivered, Plan
 from planner.planning.joint_search import OF_THE_START, said, search_run, tabled
 from planner.planning.joint_start import Start
 from planner.planning.methods.optimal import OptimalMethod

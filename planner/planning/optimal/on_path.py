@@ -27,15 +27,10 @@ class OnPath:
     samples: PathSamples  # its grid
     problem: FeedrateProblem  # the feedrate problem on the grid
     solution: FeedrateSolution  # the motion, or the status of a failure
-    # what the path's splines are made of, and the path with rounded corners they were laid on, if it has some
+    # what the path's splines are made of, if it has some
     shape: SplineShape | None = None
-    rounded: SmoothPath | None = None
+    laid: Laid | None = None  # these as they were laid, with the path under them, for who lays no others
     notes: tuple[str, ...] = ()  # sentences on what was given up
-
-    @property
-    def laid(self) -> Laid | None:
-        """As of `splined_with_stops` (geometry.py)."""
-        return None if self.rounded is None or self.shape is None else (self.rounded, self.shape)
 
     def faster_than(self, other: OnPath) -> bool:
         """True if this motion was found and takes less time than another that was found."""

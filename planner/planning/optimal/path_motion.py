@@ -18,19 +18,21 @@ from planner.base.names import AUTO, QUICK, SPLINE
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status
+from planner.machine import Machine
+from planner.motion.shaping import ShapedMotion
+from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
 from planner.planning.job.job import Job
-from planner.planning.job.made import Tables
-from planner.planning.job.plan import Plan
+from planner.planning.job.plan import NO_TABLES, Delivered, Plan, Tables
 from planner.planning.job.trace import Tell, tell_nobody
 from planner.planning.optimal.behind_filters import within_filters
 from planner.planning.optimal.compare_corners import corner_bounds, with_corners
 from planner.planning.optimal.effort import COARSE, EFFORTS, Grids, Settings
 from planner.planning.optimal.geometry import Laid, corner_shape, splined_with_stops
-from planner.planning.optimal.notes import no_spline_note, not_compared_note
+from planner.planning.optimal.notes import no_spline_note, not_compared_note, path_notes
 from planner.planning.optimal.on_path import OnPath
-from planner.planning.optimal.result import plan_of_solution, priced
 from planner.planning.optimal.tighten import within_limits
+from planner.sensitivity.activity import history
 from planner.smoothing.spline_path import with_spline
 
 
@@ -125,7 +127,7 @@ def first_motion(job: Job, settings: Settings) -> OnPath | None:
         return None
     if not planned.solution.solved:
         return None
-    return dataclasses.replace(planned.without_prices(), shape=shape, rounded=rounded)
+    return dataclasses.replace(planned.without_prices(), laid=(rounded, shape))
 
 
 def _rounded(job: Job, settings: Settings) -> SmoothPath:
@@ -150,3 +152,36 @@ def grids_for(path: SmoothPath, job: Job, settings: Settings) -> Grids:
     with job.stage("geometry"):
         coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
     return settings.effort.grids(len(coarse))
+
+
+def plan_of_solution(
+    job: Job, best: OnPath, made: Delivered | None, settings: Settings, tables: Tables = NO_TABLES
+) -> Plan:
+    """The plan of a solution and what was delivered of it, None unless solved."""
+    grid = None
+    notes: tuple[str, ...] = ()
+    if made is not None:
+        delivered = made.motion
+        if isinstance(delivered, ShapedMotion):
+            delivered = delivered.motion  # what the solution is of
+        with job.stage("report"):
+            grid = history(best.problem, best.solution, *times_of_pieces(delivered))
+        notes = (*path_notes(job.toolpath, best), *best.notes)
+    return job.plan(
+        made,
+        method=settings.method,
+        corner=settings.corner_name,
+        solver=best.solution.solver,
+        status=best.solution.status,
+        sentence=best.solution.sentence,
+        grid_points=len(best.samples),
+        tables=dataclasses.replace(tables, grid=grid),
+        notes=notes,
+    )
+
+
+def priced(best: OnPath, machine: Machine) -> bool:
+    """Whether the limits of a motion have prices: not where it has no jerk limits or its solver does not
+    tell, nor behind filters, of which the problem knows only a part."""
+    solution = best.solution
+    return solution.jerk_limited and solution.multipliers is not None and machine.fir is None

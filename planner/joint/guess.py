@@ -91,11 +91,14 @@ class CutMotion:
 
 
 class Seen(NamedTuple):
-    """Samples (T,) of a motion along a run."""
+    """Samples (T,) of a motion along runs."""
 
     t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
     acceleration: FloatArray
     jerk: FloatArray
+    s: FloatArray
 
 
 def guesses_from(
@@ -111,51 +114,51 @@ def guesses_from(
     vertex_times : (R+1,) of each run when it passes the vertices [s], strictly ascending
     exact        : the motion at any times, for the states at the nodes
     """
-    steps = [_steps(run, motion, times, cut) for run, times in zip(runs, vertex_times, strict=True)]
-    shapes, which = together(runs, len(motion.axes)), np.arange(len(runs))
-    count, legs = np.array([len(leg) for leg, _ in steps]), np.array([len(run) for run in runs])
-    leg = np.concatenate([leg for leg, _ in steps]) + np.repeat(np.cumsum(legs) - legs, count)
-    nodes = np.concatenate([times for _, times in steps])
+    motion = _between(motion, vertex_times[0][0], vertex_times[-1][-1])
+    cuts = [_steps(run, motion, times, cut) for run, times in zip(runs, vertex_times, strict=True)]
+    axes, which = motion.position.shape[1], np.arange(len(runs))
+    count, legs = np.array([len(leg) for leg, _ in cuts]), np.array([len(run) for run in runs])
+    leg = np.concatenate([leg for leg, _ in cuts]) + np.repeat(np.cumsum(legs) - legs, count)
+    nodes = np.concatenate([times for _, times in cuts])
     node = np.arange(len(leg)) + np.repeat(which, count)  # where each step begins
+    h = nodes[node + 1] - nodes[node]
     last = np.cumsum(count + 1) - 1  # of each run
     first = last - count
-    columns = [getattr(motion, name) for name in STATE]
+    columns = (getattr(motion, name) for name in STATE)
     state = np.stack([_interpolated(nodes, motion.t, column) for column in columns], axis=1)
-    moves = np.zeros((len(runs), len(motion.axes)))
+    moves = np.zeros((len(runs), axes))
     for k, run in enumerate(runs):
         moves[k, run.axis] = 1.0
         rest = np.stack([run.vertex[[0, -1]], run.ends, 0.0 * run.ends], axis=1)
         state[first[k] : last[k] + 1 : count[k], :, run.axis] = rest
-    h = nodes[node + 1] - nodes[node]
-    of_axes = state * moves[np.repeat(which, count + 1), None]
-    passed, offset = (
-        np.concatenate([run.passed for run in runs]),
-        np.concatenate([run.offset[:-1] for run in runs]),
-    )
+    passed = np.concatenate([run.passed for run in runs])
     travelled = np.interp(nodes, motion.t, motion.s)
-    place = _places(
-        shapes, passed, leg, h, (of_axes[node], of_axes[node + 1]), (travelled[node], travelled[node + 1])
-    )
-    place += offset[leg][:, None]
-    own = [
-        slice(end - many, end) for end, many in zip(np.cumsum(count).tolist(), count.tolist(), strict=True)
-    ]
+    moving = state * moves[np.repeat(which, count + 1), None]
+    place = _places(together(runs, axes), passed, leg, h, moving, travelled, node)
+    place += np.concatenate([run.offset[:-1] for run in runs])[leg, None]
+    h_of, place_of = (np.split(column, np.cumsum(count)[:-1]) for column in (h, place))
     if exact is not None:
         inner = np.ones(len(nodes), dtype=bool)
         inner[first] = inner[last] = False
-        begins = [times[0] + np.cumsum(h[steps][:-1]) for times, steps in zip(vertex_times, own, strict=True)]
+        begins = [times[0] + np.cumsum(own[:-1]) for times, own in zip(vertex_times, h_of, strict=True)]
         seen = exact(np.concatenate(begins))
         for m, name in enumerate(STATE):
             state[inner, m] = getattr(seen, name)
     return [
         Guess(
-            leg=steps[k][0],
-            h=h[own[k]],
+            leg=cuts[k][0],
+            h=h_of[k],
             state=state[first[k] : last[k] + 1][:, :, run.axis],
-            place=np.maximum.accumulate(place[own[k]].ravel()).reshape(-1, 4),
+            place=np.maximum.accumulate(place_of[k].ravel()).reshape(-1, 4),
         )
         for k, run in enumerate(runs)
     ]
+
+
+def _between(motion: Trajectory | Seen, begin: float, end: float) -> Seen:
+    """The samples from one time to another [s]."""
+    lo, hi = np.searchsorted(motion.t, [begin, end])
+    return Seen(*(getattr(motion, name)[lo : hi + 1] for name in Seen._fields))
 
 
 def unit_of(run: TubeRun) -> float:
@@ -189,10 +192,9 @@ def busy(run: TubeRun, motion: Trajectory | Seen, unit: float) -> FloatArray:
     return np.asarray(np.interp(motion.t, motion.t[seen], np.append(0.0, np.cumsum(JUMP * jumps))))
 
 
-def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
+def _steps(run: TubeRun, motion: Seen, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
-    begin, end = np.searchsorted(motion.t, vertex_time[[0, -1]])
-    seen = Seen(*(column[begin : end + 1] for column in (motion.t, motion.acceleration, motion.jerk)))
+    seen = _between(motion, vertex_time[0], vertex_time[-1])
     unit = unit_of(run)
     spent = busy(run, seen, unit) * cut.per_unit / unit
     least = least_of_legs(run, np.diff(vertex_time), cut)
@@ -226,21 +228,23 @@ def _places(
     passed: Array,
     leg: Array,
     h: FloatArray,
-    states: tuple[FloatArray, FloatArray],
-    travelled: tuple[FloatArray, FloatArray],
+    state: FloatArray,
+    travelled: FloatArray,
+    node: Array,
 ) -> FloatArray:
     """(N, 4) places of the control points on their legs.
 
     passed    : (R,) of the legs
-    states    : (N, 3, A) where each step begins and ends
-    travelled : (N,) length that the motion has travelled there [mm]
+    state     : (n, 3, A) at all nodes
+    travelled : (n,) length that the motion has travelled there [mm]
+    node      : (N,) where each step begins; it ends at the next one
     """
-    (p, v), (q, w) = ((state[:, 0], state[:, 1]) for state in states)
+    (p, v), (q, w) = ((state[at, 0], state[at, 1]) for at in (node, node + 1))
     third = h[:, None] / 3
     controls = np.concatenate([p, p + third * v, q - third * w, q])
     last = np.append(np.flatnonzero(np.diff(leg)), len(leg) - 1)  # step of every leg
     begin = np.append(0, last[:-1] + 1)
-    before, behind = travelled
+    before, behind = travelled[node], travelled[node + 1]
     per_length = legs.length / (behind[last] - before[begin])
     number, many = np.arange(len(leg)) - begin[leg], last - begin + 1
     fraction = np.array([[0.0], [1 / 3], [2 / 3], [1.0]])

@@ -23,7 +23,7 @@ from planner.geometry.legs import legs_of
 from planner.planning.job.choice import better, counted_time, faster
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
-from planner.planning.joint_leads import with_leads
+from planner.planning.joint_start import between_leads, why_not, with_leads
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.stop import StopMethod
 from planner.planning.optimal.effort import Settings
@@ -75,21 +75,14 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
     found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings, kept))
     joint = found.plan is not None
     began = first.solution.cycle_time
-    return Tried(
-        best=found.plan,
-        kept=kept,
-        joint=joint,
-        steps=found.steps,
-        slower=found.slower,
-        began=began,
-        laid=None if joint else laid,
+    tried = Tried(
+        best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower, began=began
     )
+    return dataclasses.replace(tried, laid=None if joint else laid)
 
 
 def _in_motion(job: Job, settings: Settings, tried: Tried) -> Tried:
     """The joint search of a path that begins or ends in motion; without a motion what can be said of it."""
-    from planner.planning.joint_leads import between_leads, why_not
-
     asked, led = is_searched(job, settings), with_leads(job)
     tried = _joint(job, settings, tried) if asked else tried
     if tried.plan is not None:

@@ -36,8 +36,7 @@ from planner.planning.job.by_run import RunsInTime, full_stops
 from planner.planning.job.job import Job
 from planner.planning.job.plan import NO_TABLES, Delivered, Plan, Tables
 from planner.planning.job.runs_alone import ALONE_MOST, Alone, with_runs_alone
-from planner.planning.joint_leads import between_leads, with_leads
-from planner.planning.joint_start import Start
+from planner.planning.joint_start import Start, between_leads, with_leads
 from planner.planning.optimal.effort import Search, Settings
 from planner.planning.optimal.notes import path_notes
 from planner.planning.optimal.on_path import OnPath
@@ -205,15 +204,16 @@ class InTwo(NamedTuple):
 
 def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo:
     """The solver as the effort has it."""
+    own = partial(TubeOwn, smooth=search.smooth)
     if stays and not search.finer:
-        return TubeOwn(search.gap, progress=report, smooth=search.smooth)
+        return own(search.gap, progress=report)
     ends = np.cumsum([0.0, *SEARCHES[: len(search.finer) + 1]])
     parts = pairwise((ends / ends[-1]).tolist())
     shares = [lambda done, a=a, b=b: report(a + done * (b - a)) for a, b in parts]
     return InTwo(
-        TubeOwn(search.gap, stays=False, progress=shares[0], smooth=search.smooth),
+        own(search.gap, stays=False, progress=shares[0]),
         tuple(
-            (cut, TubeOwn(gap, stays=stays, progress=share, smooth=search.smooth))
+            (cut, own(gap, stays=stays, progress=share))
             for (cut, gap), share in zip(search.finer, shares[1:], strict=True)
         ),
     )

@@ -35,8 +35,7 @@ from planner.planning.job.job import Job
 from planner.planning.job.less_tolerance import with_less_tolerance
 from planner.planning.job.plan import Plan
 from planner.planning.job.runs_alone import with_runs_alone
-from planner.planning.job.stages import Progress, Stages
-from planner.planning.job.trace import Log
+from planner.planning.job.trace import Log, Progress, Stages
 from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.geometry import Laid
 from planner.planning.optimal.on_path import OnPath

@@ -114,9 +114,9 @@ def guesses_from(
     vertex_times : (R+1,) of each run when it passes the vertices [s], strictly ascending
     exact        : the motion at any times, for the states at the nodes
     """
-    motion = _between(motion, vertex_times[0][0], vertex_times[-1][-1])
-    cuts = [_steps(run, motion, times, cut) for run, times in zip(runs, vertex_times, strict=True)]
-    axes, which = motion.position.shape[1], np.arange(len(runs))
+    seen = _between(motion, vertex_times[0][0], vertex_times[-1][-1])
+    cuts = [_steps(run, seen, times, cut) for run, times in zip(runs, vertex_times, strict=True)]
+    axes, which = seen.position.shape[1], np.arange(len(runs))
     count, legs = np.array([len(leg) for leg, _ in cuts]), np.array([len(run) for run in runs])
     leg = np.concatenate([leg for leg, _ in cuts]) + np.repeat(np.cumsum(legs) - legs, count)
     nodes = np.concatenate([times for _, times in cuts])
@@ -124,15 +124,15 @@ def guesses_from(
     h = nodes[node + 1] - nodes[node]
     last = np.cumsum(count + 1) - 1  # of each run
     first = last - count
-    columns = (getattr(motion, name) for name in STATE)
-    state = np.stack([_interpolated(nodes, motion.t, column) for column in columns], axis=1)
+    columns = (getattr(seen, name) for name in STATE)
+    state = np.stack([_interpolated(nodes, seen.t, column) for column in columns], axis=1)
     moves = np.zeros((len(runs), axes))
     for k, run in enumerate(runs):
         moves[k, run.axis] = 1.0
         rest = np.stack([run.vertex[[0, -1]], run.ends, 0.0 * run.ends], axis=1)
         state[first[k] : last[k] + 1 : count[k], :, run.axis] = rest
     passed = np.concatenate([run.passed for run in runs])
-    travelled = np.interp(nodes, motion.t, motion.s)
+    travelled = np.interp(nodes, seen.t, seen.s)
     moving = state * moves[np.repeat(which, count + 1), None]
     place = _places(together(runs, axes), passed, leg, h, moving, travelled, node)
     place += np.concatenate([run.offset[:-1] for run in runs])[leg, None]
@@ -141,9 +141,9 @@ def guesses_from(
         inner = np.ones(len(nodes), dtype=bool)
         inner[first] = inner[last] = False
         begins = [times[0] + np.cumsum(own[:-1]) for times, own in zip(vertex_times, h_of, strict=True)]
-        seen = exact(np.concatenate(begins))
+        exactly = exact(np.concatenate(begins))
         for m, name in enumerate(STATE):
-            state[inner, m] = getattr(seen, name)
+            state[inner, m] = getattr(exactly, name)
     return [
         Guess(
             leg=cuts[k][0],

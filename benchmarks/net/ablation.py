@@ -1,4 +1,4 @@
-"""What the default loses without each of its retries, those of the table of planner/planning/attempts.py, and without
+"""What the default loses without each of its retries, those of its table `RETRIES`, and without
 single numbers of the joint search and of shaping (`NUMBERS`).
 
     python -m benchmarks.net.ablation ROWS --net NET [--without NAME] [--most 60]     plan without one of them, or all in turn
@@ -17,7 +17,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,15 +27,62 @@ from planner.base.threads import use_threads
 from planner.delivery import mending
 from planner.joint import guess, normal_rows, own, run
 from planner.planning import attempts
-from planner.planning.attempt import Attempt
-from planner.planning.attempts import RETRIES
 from planner.planning.job import less_tolerance, runs_alone
 from planner.planning.methods import optimal, second_order
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.optimal import behind_filters, geometry, path_motion, shaped, tighten
+from planner.planning.page import Attempt
 
 Switch = Callable[[], None]
 NONE = Attempt("none", lambda *_: False, lambda job, settings, tried: tried)
+
+
+class Retry(NamedTuple):
+    """Something that is tried once more, or in another way.
+
+    steps : in the trace, as they begin
+    when  : and what
+    most  : at most so often
+    worth : how much longer plans are without it, on the mean and at worst [-], or what it saves from failing
+    """
+
+    steps: tuple[str, ...]
+    when: str
+    most: str
+    worth: str
+
+
+# All that is tried once more. `python -m benchmarks.net.ablation ROWS --net NET --without STEP` plans without
+# it, on jobs of NET where it shows. Worth by these switches on those of 386 random jobs by the default
+# (jobs/random_lines.py 0 to 329, campaign 7000000 to 7000059) where they show and that plan fastest, 5 to 32 each:
+# runs alone, closed form, tighten, less for the period, slower in places; of the share of tolerance on 16 behind
+# filters. That of the search, once more, on 106 programs of benchmarks/judge/feed_promise.py, whose F changes at every
+# block; of the others by benchmarks/results/ablation.md.
+RETRIES = (
+    Retry(
+        ("search, once more",),
+        "the search has not ended: from a motion that stays where it fails",
+        "1",
+        "2e-2, 1.2",
+    ),
+    Retry(("runs alone",), "runs are not found, or the verdict finds something on few", "3", "1e-2, 2e-1"),
+    Retry(("closed form",), "there is but a motion on a path, or full stops are sooner", "2", "2e-2, 2e-1"),
+    Retry(("splines",), "full stops where a run gets no spline", "2", "3e-5, 6e-4"),
+    Retry(("corners",), "single ones between full stops, where they may be faster", "2", "2e-3, 2e-2"),
+    Retry(("tighten",), "limits, where they are exceeded between grid points", "2", "3e-5, 5e-4"),
+    Retry(("filters",), "less feed where the tolerance is left behind filters", "16", "5e-1, 3"),
+    Retry(("share of tolerance",), "behind long filters, less for the path", "2", "3e-3, 4e-2"),
+    Retry(
+        ("less for the period",), "chords between samples leave the tolerance", "8", "1e-1, 2e-1; saves plans"
+    ),
+    Retry(("slower in places",), "the verdict finds something", "6", "2e-2, 2e-1"),
+    Retry(
+        ("shaped",),
+        "a shaper that takes more than the tolerance: more limits, less tolerance; at last gently",
+        "5, 1",
+        "1e-1, 3e-1",
+    ),
+)
 
 
 def _set(owner: Any, name: str, value: Any) -> Switch:

@@ -30,7 +30,7 @@ from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.geometry import splined_with_stops
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import ThirdOrder
-from planner.planning.optimal.result import plan_of_solution
+from planner.planning.optimal.path_motion import plan_of_solution
 from planner.planning.optimal.tighten import within_limits
 from planner.planning.page import Method
 from planner.smoothing.spline_path import with_spline

@@ -25,7 +25,7 @@ from benchmarks.jobs import problems, random_lines
 from benchmarks.record import RESULTS, markdown, write_results
 from planner.base.arrays import FloatArray
 from planner.geometry.build import toolpath_from_program
-from planner.joint.guess import Guess, guess_from
+from planner.joint.guess import Guess, guesses_from
 from planner.joint.nlp import TubeNLP
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
@@ -77,7 +77,7 @@ def begun(program: Program, machine: Machine) -> tuple[TubeRun, Guess] | None:
     times[-1] = plan.trajectory.t[-1]
     if (np.diff(times[runs[0].first]) <= 0).any():
         return None
-    return runs[0], guess_from(runs[0], plan.trajectory, times[runs[0].first])
+    return runs[0], guesses_from([runs[0]], plan.trajectory, [times[runs[0].first]])[0]
 
 
 def jobs() -> Iterator[tuple[str, Program, Machine]]:

@@ -107,8 +107,7 @@ def plan_command(
     (job,) = jobs
     from planner import plan
     from planner.nc.reader import read_program
-    from planner.planning.job.stages import Stages
-    from planner.planning.job.trace import Trace
+    from planner.planning.job.trace import Stages, Trace
     from planner.report.export import SUMMARY, check_places, files_to_keep, write_plan
     from planner.report.replace import check_file, write_whole
     from planner.report.summary import summary

@@ -15,12 +15,14 @@ and each of them has its place on the run, the nearest one, never going back.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.joint.leg_shapes import LegShapes, together
 from planner.joint.run import TubeRun
 from planner.motion.trajectory import Trajectory
 
@@ -38,6 +40,7 @@ ARC_STEP = 0.8
 JUMP, SEEN = 3.0, 0.1
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
+STATE = ("position", "velocity", "acceleration")
 
 
 class Cut(NamedTuple):
@@ -87,19 +90,75 @@ class CutMotion:
         return len(self.h)
 
 
-def guess_from(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut = DEFAULT_CUT) -> Guess:
-    """Cut a motion along a run of R legs into steps.
+class Seen(NamedTuple):
+    """Samples (T,) of a motion along runs."""
 
-    motion      : along this run alone; at its ends the run's velocities are put in its place
-    vertex_time : (R+1,) when it passes the vertices [s], strictly ascending
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    s: FloatArray
+
+
+def guesses_from(
+    runs: Sequence[TubeRun],
+    motion: Trajectory,
+    vertex_times: Sequence[FloatArray],
+    cut: Cut = DEFAULT_CUT,
+    exact: Callable[[FloatArray], Trajectory] | None = None,
+) -> list[Guess]:
+    """Cut a motion along runs that follow one another into steps, each by itself; at their ends the runs' velocities are put in
+    its place.
+
+    vertex_times : (R+1,) of each run when it passes the vertices [s], strictly ascending
+    exact        : the motion at any times, for the states at the nodes
     """
-    leg, nodes = _steps(run, motion, vertex_time, cut)
-    of_axes = (getattr(motion, name)[:, run.axis] for name in ("position", "velocity", "acceleration"))
-    state = np.stack([_interpolated(nodes, motion.t, column) for column in of_axes], axis=1)
-    state[[0, -1]] = np.stack([run.vertex[[0, -1]], run.ends, 0.0 * run.ends], axis=1)
-    h = np.diff(nodes)
-    place = _places(run, leg, h, state, np.interp(nodes, motion.t, motion.s))
-    return Guess(leg=leg, h=h, state=state, place=place)
+    seen = _between(motion, vertex_times[0][0], vertex_times[-1][-1])
+    cuts = [_steps(run, seen, times, cut) for run, times in zip(runs, vertex_times, strict=True)]
+    axes, which = seen.position.shape[1], np.arange(len(runs))
+    count, legs = np.array([len(leg) for leg, _ in cuts]), np.array([len(run) for run in runs])
+    leg = np.concatenate([leg for leg, _ in cuts]) + np.repeat(np.cumsum(legs) - legs, count)
+    nodes = np.concatenate([times for _, times in cuts])
+    node = np.arange(len(leg)) + np.repeat(which, count)  # where each step begins
+    h = nodes[node + 1] - nodes[node]
+    last = np.cumsum(count + 1) - 1  # of each run
+    first = last - count
+    columns = (getattr(seen, name) for name in STATE)
+    state = np.stack([_interpolated(nodes, seen.t, column) for column in columns], axis=1)
+    moves = np.zeros((len(runs), axes))
+    for k, run in enumerate(runs):
+        moves[k, run.axis] = 1.0
+        rest = np.stack([run.vertex[[0, -1]], run.ends, 0.0 * run.ends], axis=1)
+        state[first[k] : last[k] + 1 : count[k], :, run.axis] = rest
+    passed = np.concatenate([run.passed for run in runs])
+    travelled = np.interp(nodes, seen.t, seen.s)
+    moving = state * moves[np.repeat(which, count + 1), None]
+    place = _places(together(runs, axes), passed, leg, h, moving, travelled, node)
+    place += np.concatenate([run.offset[:-1] for run in runs])[leg, None]
+    h_of, place_of = (np.split(column, np.cumsum(count)[:-1]) for column in (h, place))
+    if exact is not None:
+        inner = np.ones(len(nodes), dtype=bool)
+        inner[first] = inner[last] = False
+        begins = [times[0] + np.cumsum(own[:-1]) for times, own in zip(vertex_times, h_of, strict=True)]
+        exactly = exact(np.concatenate(begins))
+        for m, name in enumerate(STATE):
+            state[inner, m] = getattr(exactly, name)
+    return [
+        Guess(
+            leg=cuts[k][0],
+            h=h_of[k],
+            state=state[first[k] : last[k] + 1][:, :, run.axis],
+            place=np.maximum.accumulate(place_of[k].ravel()).reshape(-1, 4),
+        )
+        for k, run in enumerate(runs)
+    ]
+
+
+def _between(motion: Trajectory | Seen, begin: float, end: float) -> Seen:
+    """The samples from one time to another [s]."""
+    lo, hi = np.searchsorted(motion.t, [begin, end])
+    return Seen(*(getattr(motion, name)[lo : hi + 1] for name in Seen._fields))
 
 
 def unit_of(run: TubeRun) -> float:
@@ -116,7 +175,7 @@ def least_of_legs(run: TubeRun, lasting: FloatArray, cut: Cut) -> FloatArray:
     return least
 
 
-def busy(run: TubeRun, motion: Trajectory, unit: float) -> FloatArray:
+def busy(run: TubeRun, motion: Trajectory | Seen, unit: float) -> FloatArray:
     """(T,) how long the jerk has been at its limit until the samples, or without one, where accelerations jump,
     how long it would have been at its scale [s]."""
     if np.isfinite(run.jerk).all():
@@ -133,19 +192,20 @@ def busy(run: TubeRun, motion: Trajectory, unit: float) -> FloatArray:
     return np.asarray(np.interp(motion.t, motion.t[seen], np.append(0.0, np.cumsum(JUMP * jumps))))
 
 
-def _steps(run: TubeRun, motion: Trajectory, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
+def _steps(run: TubeRun, motion: Seen, vertex_time: FloatArray, cut: Cut) -> tuple[Array, FloatArray]:
     """(N,) legs and (N+1,) times of the nodes [s]."""
+    seen = _between(motion, vertex_time[0], vertex_time[-1])
     unit = unit_of(run)
-    spent = busy(run, motion, unit) * cut.per_unit / unit
+    spent = busy(run, seen, unit) * cut.per_unit / unit
     least = least_of_legs(run, np.diff(vertex_time), cut)
     # the steps up to the times t, on all legs at once: `done` from the beginning of their leg, `share` from
     # that of the run
-    inside = motion.t[(motion.t > vertex_time[0]) & (motion.t < vertex_time[-1])]
+    inside = seen.t[(seen.t > vertex_time[0]) & (seen.t < vertex_time[-1])]
     t = np.union1d(inside, vertex_time)
     leg = np.minimum(np.searchsorted(vertex_time, t, side="right") - 1, len(run) - 1)
-    spent_at = np.interp(vertex_time, motion.t, spent)
+    spent_at = np.interp(vertex_time, seen.t, spent)
     even = (t - vertex_time[leg]) / np.diff(vertex_time)[leg]
-    done = np.interp(t, motion.t, spent) + (least[leg] * even - spent_at[leg])
+    done = np.interp(t, seen.t, spent) + (least[leg] * even - spent_at[leg])
     whole = spent_at[1:] + (least - spent_at[:-1])
     before = np.append(0.0, np.cumsum(whole))
     share = done + before[leg]
@@ -163,23 +223,37 @@ def _interpolated(at: FloatArray, t: FloatArray, column: FloatArray) -> FloatArr
     return np.stack([np.interp(at, t, values) for values in column.T], axis=1)
 
 
-def _places(run: TubeRun, leg: Array, h: FloatArray, state: FloatArray, travelled: FloatArray) -> FloatArray:
-    """(N, 4) places of the control points; travelled: (N+1,) length that the motion has travelled at the
-    nodes [mm]."""
-    p, v = state[:, 0], state[:, 1]
+def _places(
+    legs: LegShapes,
+    passed: Array,
+    leg: Array,
+    h: FloatArray,
+    state: FloatArray,
+    travelled: FloatArray,
+    node: Array,
+) -> FloatArray:
+    """(N, 4) places of the control points on their legs.
+
+    passed    : (R,) of the legs
+    state     : (n, 3, A) at all nodes
+    travelled : (n,) length that the motion has travelled there [mm]
+    node      : (N,) where each step begins; it ends at the next one
+    """
+    (p, v), (q, w) = ((state[at, 0], state[at, 1]) for at in (node, node + 1))
     third = h[:, None] / 3
-    controls = np.concatenate([p[:-1], p[:-1] + third * v[:-1], p[1:] - third * v[1:], p[1:]])
+    controls = np.concatenate([p, p + third * v, q - third * w, q])
     last = np.append(np.flatnonzero(np.diff(leg)), len(leg) - 1)  # step of every leg
     begin = np.append(0, last[:-1] + 1)
-    per_length = run.length / (travelled[last + 1] - travelled[begin])
+    before, behind = travelled[node], travelled[node + 1]
+    per_length = legs.length / (behind[last] - before[begin])
     number, many = np.arange(len(leg)) - begin[leg], last - begin + 1
     fraction = np.array([[0.0], [1 / 3], [2 / 3], [1.0]])
-    there = (1 - fraction) * travelled[:-1] + fraction * travelled[1:]
-    x, of = ((there - travelled[begin][leg]) * per_length[leg]).ravel(), np.tile(leg, 4)
+    there = (1 - fraction) * before + fraction * behind
+    x, of = ((there - before[begin][leg]) * per_length[leg]).ravel(), np.tile(leg, 4)
     for _ in range(NEAREST_STEPS):
-        miss, along = controls - run.points(of, x), run.tangents(of, x)
-        x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, run.length[of])
-    even = run.length[leg] * (number + fraction) / many[leg]
-    places = np.ascontiguousarray(np.where(run.passed[leg], even, x.reshape(4, -1)).T)
-    places[begin, 0], places[last, 3] = 0.0, run.length
-    return np.maximum.accumulate((places + run.offset[leg][:, None]).ravel()).reshape(-1, 4)
+        miss, along = controls - legs.points(of, x), legs.tangents(of, x)
+        x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, legs.length[of])
+    even = legs.length[leg] * (number + fraction) / many[leg]
+    places = np.ascontiguousarray(np.where(passed[leg], even, x.reshape(4, -1)).T)
+    places[begin, 0], places[last, 3] = 0.0, legs.length
+    return places

@@ -1,9 +1,15 @@
 """The legs of the free optimum (run.py): where they begin, their coefficients, and their feed in the axes of F."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.build import feed_groups, path_per_length
+from planner.geometry.curves import Curves
 from planner.geometry.legs import legs_of
 from planner.geometry.toolpath import Toolpath
 from planner.geometry.word_feed import ROTARY, goes_by
@@ -19,6 +25,87 @@ def edges_of(toolpath: Toolpath) -> Array:
     edge[legs_of(toolpath).first] = True
     edge[1:-1] |= (toolpath.feed[1:] != toolpath.feed[:-1]) | (np.diff(budget) != 0)
     return np.flatnonzero(edge)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LegShapes:
+    """R legs over the A axes that move on them, by the formula of run.py.
+
+    axis                : (A,) indices of the axes among those of the toolpath
+    length              : (R,) [mm]
+    base, drift, e1, e2 : (R, A) [mm], [-]
+    radius, rate        : (R,) [mm], [rad/mm]; of curves the rate bounds derivatives
+    curve               : (R,) row in `curves`, or -1
+    curves              : over the A axes
+    """
+
+    axis: Array
+    length: FloatArray
+    base: FloatArray
+    drift: FloatArray
+    e1: FloatArray
+    e2: FloatArray
+    radius: FloatArray
+    rate: FloatArray
+    curve: Array
+    curves: Curves
+
+    def points(self, leg: Array, x: FloatArray) -> FloatArray:
+        """(n, A) points of the path [mm] at the places x (n,) [mm] on the legs `leg` (n,)."""
+        found = self.base[leg] + self.drift[leg] * x[:, None]
+        if self.radius.any():
+            turned = (self.rate[leg] * x)[:, None]
+            circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
+            found += self.radius[leg, None] * circle
+        return self._on_curves(leg, x, 0, found)
+
+    def tangents(self, leg: Array, x: FloatArray) -> FloatArray:
+        """(n, A) dP/dx [-] at the places x (n,) [mm] on the legs `leg` (n,)."""
+        found = self.drift[leg]
+        if self.radius.any():
+            turned = (self.rate[leg] * x)[:, None]
+            across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
+            found += (self.radius * self.rate)[leg, None] * across
+        return self._on_curves(leg, x, 1, found)
+
+    def _on_curves(self, leg: Array, x: FloatArray, order: int, others: FloatArray) -> FloatArray:
+        """The x-derivative of this order of the legs that are curves, the `others` (n, A) of those that are
+        not."""
+        of = np.flatnonzero(self.curve[leg] >= 0)
+        if len(of):
+            others[of] = self.curves.at(self.curve[leg[of]], self.length[leg[of]], x[of])[:, order]
+        return others
+
+
+def together(parts: Sequence[LegShapes], axes: int) -> LegShapes:
+    """The legs of one after the other, over all `axes` of the toolpath; those that do not move stand at 0."""
+
+    def all_of(name: str) -> Array:
+        return np.concatenate([getattr(one, name) for one in parts])
+
+    def wide(name: str) -> FloatArray:
+        whole, end = np.zeros((sum(len(one.length) for one in parts), axes)), 0
+        for one in parts:
+            begin, end = end, end + len(one.length)
+            whole[begin:end, one.axis] = getattr(one, name)
+        return whole
+
+    count = [len(one.curves) for one in parts]
+    before = np.repeat(np.cumsum(count) - count, [len(one.length) for one in parts])
+    points = np.zeros((sum(count), 4, axes))
+    for one, end in zip(parts, np.cumsum(count).tolist(), strict=True):
+        points[end - len(one.curves) : end, :, one.axis] = one.curves.points
+    weight, twist = (
+        np.concatenate([getattr(one.curves, name) for one in parts]) for name in ("weight", "twist")
+    )
+    curve = all_of("curve")
+    return LegShapes(
+        axis=np.arange(axes),
+        curve=np.where(curve >= 0, curve + before, -1),
+        curves=Curves(points=points, weight=weight, twist=twist),
+        **{name: all_of(name) for name in ("length", "radius", "rate")},
+        **{name: wide(name) for name in ("base", "drift", "e1", "e2")},
+    )
 
 
 def shapes_of(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, FloatArray]:

@@ -34,10 +34,9 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray, freeze
 from planner.corners.budget import chord_rate, filter_rate, largest_normal
 from planner.feedrate.constraints.limits import JERK, Limits
-from planner.geometry.curves import Curves
 from planner.geometry.toolpath import Joint, Toolpath
 from planner.joint.laws import PUSH
-from planner.joint.leg_shapes import edges_of, shapes_of, word_change, word_shares, words_of
+from planner.joint.leg_shapes import LegShapes, edges_of, shapes_of, word_change, word_shares, words_of
 from planner.joint.own_laws import RunLaws, laws_of
 from planner.machine import Machine
 from planner.machine.user_limit import QUANTITIES
@@ -61,17 +60,12 @@ TOGETHER = 2.0  # vertices may be passed together that are so many tolerances ap
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TubeRun:
+class TubeRun(LegShapes):
     """R legs from rest to rest, or as `ends` says, over the A axes that move on them, and the R+1 vertices around them.
 
     axis                         : (A,) their indices among the axes of the toolpath
     first                        : (R+1,) leg r holds the toolpath's segments first[r] : first[r+1]
-    length                       : (R,) [mm]
-    base, drift, e1, e2          : (R, A) the formula in the module's text [mm], [-]
-    radius, rate                 : (R,) [mm], [rad/mm]; of curves the rate bounds derivatives (module text)
     curvature                    : (R,) bound of it on the leg [1/mm]
-    curve                        : (R,) row in `curves`, or -1
-    curves                       : over the A axes
     budget, feed                 : (R,) tolerance [mm], programmed feed [mm/s]
     across_max                   : (R,) largest normal acceleration that the machine allows [mm/s2]; inf where
                                    the axes cannot exceed it
@@ -91,16 +85,7 @@ class TubeRun:
 
     axis: Array
     first: Array
-    length: FloatArray
-    base: FloatArray
-    drift: FloatArray
-    e1: FloatArray
-    e2: FloatArray
-    radius: FloatArray
-    rate: FloatArray
     curvature: FloatArray
-    curve: Array
-    curves: Curves
     budget: FloatArray
     feed: FloatArray
     across_max: FloatArray
@@ -123,18 +108,14 @@ class TubeRun:
         freeze(self, "axis", np.int64, (axes,))
         freeze(self, "first", np.int64, (legs + 1,))
         freeze(self, "curve", np.int64, (legs,))
-        for name in ("length", "radius", "rate", "curvature", "budget"):
-            freeze(self, name, np.float64, (legs,))
-        for name in ("feed", "across_max"):
-            freeze(self, name, np.float64, (legs,), finite=False)
-        for name in ("base", "drift", "e1", "e2"):
-            freeze(self, name, np.float64, (legs, axes))
+        freeze(self, "length radius rate curvature budget", np.float64, (legs,))
+        freeze(self, "feed across_max", np.float64, (legs,), finite=False)
+        freeze(self, "base drift e1 e2", np.float64, (legs, axes))
         freeze(self, "vertex", np.float64, (legs + 1, axes))
         freeze(self, "vertex_budget", np.float64, (legs + 1,))
         freeze(self, "ends", np.float64, (2, axes))
         freeze(self, "lag", np.float64, (None, 2))
-        for name in ("velocity", "acceleration", "counts"):
-            freeze(self, name, np.float64, (axes,))
+        freeze(self, "velocity acceleration counts", np.float64, (axes,))
         freeze(self, "jerk", np.float64, (axes,), finite=False)
         freeze(self, "word", np.float64, (legs, None), finite=False)
 
@@ -190,8 +171,11 @@ class TubeRun:
         """(R,) legs whose steps have their places by number, not where they are nearest: inside of so narrow a
         bend the nearest place stands still, goes back, or is on another branch while a motion goes on. Not
         where F changes: there the motion has to be nearest to the vertex."""
+        narrow: Array = PASSED * self.curvature * self.budget > 1.0
+        if not narrow.any():
+            return narrow
         changes = np.append(self.switch, 0.0) != 0.0
-        return (PASSED * self.curvature * self.budget > 1.0) & ~(changes[:-1] | changes[1:])
+        return narrow & ~(changes[:-1] | changes[1:])
 
     def word_share(self, leg: Array, velocity: FloatArray) -> FloatArray:
         """(n,) share of the feed that motions use, counted in the axes that F goes by; 0 where those are
@@ -211,32 +195,6 @@ class TubeRun:
     def leg_at(self, place: FloatArray) -> Array:
         """(n,) legs at the places `place` (n,) along the run [mm]."""
         return np.clip(np.searchsorted(self.offset, place, side="right") - 1, 0, len(self) - 1)
-
-    def points(self, leg: Array, x: FloatArray) -> FloatArray:
-        """(n, A) points of the path [mm] at the places x (n,) [mm] on the legs `leg` (n,)."""
-        found = self.base[leg] + self.drift[leg] * x[:, None]
-        if self.radius.any():
-            turned = (self.rate[leg] * x)[:, None]
-            circle = np.cos(turned) * self.e1[leg] + np.sin(turned) * self.e2[leg]
-            found += self.radius[leg, None] * circle
-        return self._on_curves(leg, x, 0, found)
-
-    def tangents(self, leg: Array, x: FloatArray) -> FloatArray:
-        """(n, A) dP/dx [-] at the places x (n,) [mm] on the legs `leg` (n,)."""
-        found = self.drift[leg]
-        if self.radius.any():
-            turned = (self.rate[leg] * x)[:, None]
-            across = np.cos(turned) * self.e2[leg] - np.sin(turned) * self.e1[leg]
-            found += (self.radius * self.rate)[leg, None] * across
-        return self._on_curves(leg, x, 1, found)
-
-    def _on_curves(self, leg: Array, x: FloatArray, order: int, others: FloatArray) -> FloatArray:
-        """The x-derivative of this order of the legs that are curves, the `others` (n, A) of those that are
-        not."""
-        of = np.flatnonzero(self.curve[leg] >= 0)
-        if len(of):
-            others[of] = self.curves.at(self.curve[leg[of]], self.length[leg[of]], x[of])[:, order]
-        return others
 
 
 def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = True) -> Iterator[TubeRun]:

@@ -51,7 +51,7 @@ def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatAr
 
 def _distance(run: TubeRun, leg: Array, point: FloatArray, x: FloatArray) -> FloatArray:
     """(N,) distances of points (N, A) from their legs, from places x (N,) near the nearest ones [mm]."""
-    for _ in range(NEAREST_STEPS):
+    for _ in range(NEAREST_STEPS if run.radius.any() else 1):
         along = run.tangents(leg, x)
         x = x + ((point - run.points(leg, x)) * along).sum(axis=1) / (along**2).sum(axis=1)
         x = np.clip(x, 0.0, run.length[leg])

@@ -125,7 +125,7 @@ class Plotter(Record):
 
 class ToolData(Record):
     """A tool: length (along z) and offset along x (lathes), which G43 adds, and diameter, which G41 and G42
-    use [mm]. What F and S are compared with (planning/job/cutting.py): its number of `flutes`,
+    use [mm]. What F and S are compared with (planning/job/notes.py): its number of `flutes`,
     `feed_per_tooth_max` [mm], `surface_speed_max` [m/min] and `spindle_max` [1/min], or None."""
 
     length: Finite = 0.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,16 +20,15 @@ from planner.corners.budget import filters_count
 from planner.feedrate.constraints.limits import Limits
 from planner.feedrate.solution import Status
 from planner.geometry.legs import legs_of
-from planner.planning.attempt import Attempt, Tried
 from planner.planning.job.choice import better, counted_time, faster
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Plan
-from planner.planning.joint_leads import with_leads
+from planner.planning.joint_start import between_leads, why_not, with_leads
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.stop import StopMethod
 from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.path_motion import first_motion, kept_on_path, plan_on_path
-from planner.planning.page import best_of, tolerant
+from planner.planning.page import Attempt, Tried, best_of, tolerant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,22 +69,24 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
         return Tried(steps=steps)
     if led is job and steps > CHEAP and first.solution.cycle_time < (1.0 + LEAST_LEFT) * _at_feed(job):
         job.tell("search", left=first.solution.cycle_time / _at_feed(job) - 1.0)
-        return Tried(steps=steps, left=False)
-    kept = cache(partial(kept_on_path, settings=settings))
+        return Tried(steps=steps, left=False, laid=first.laid)
+    laid = first.laid if led is job else None
+    kept = cache(partial(kept_on_path, settings=settings, laid=laid))
     found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings, kept))
     joint = found.plan is not None
     began = first.solution.cycle_time
-    return Tried(best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower, began=began)
+    tried = Tried(
+        best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower, began=began
+    )
+    return dataclasses.replace(tried, laid=None if joint else laid)
 
 
 def _in_motion(job: Job, settings: Settings, tried: Tried) -> Tried:
     """The joint search of a path that begins or ends in motion; without a motion what can be said of it."""
-    from planner.planning.joint_leads import between_leads, why_not
-
     asked, led = is_searched(job, settings), with_leads(job)
     tried = _joint(job, settings, tried) if asked else tried
-    if tried.best is not None or tried.slower is not None:
-        return dataclasses.replace(tried, best=tried.best or tried.slower)
+    if tried.plan is not None:
+        return tried
     first = first_motion(led, settings) if asked else None
     why = SEARCHED_ONLY if first is None else why_not(between_leads(first.motion(), job, led), job)
     none = job.plan(
@@ -122,18 +123,18 @@ def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
 
 
 def _not_joint(job: Job, settings: Settings, tried: Tried) -> bool:
-    """Whether there is no plan yet, or the motion on the path takes less time, as far as it is known and the
-    search was for the least, or may behind long filters."""
-    if filters_count(*job.real):
+    """Whether there is no plan yet, not even one that is run slower in places, or the motion on the path takes less time, as
+    far as it is known and the search was for the least, or may behind long filters."""
+    if filters_count(*job.real) or tried.plan is None:
         return True
     before = tried.began if tried.path is None else tried.path[1].end
-    sooner = before < (1.0 - SAME_TIME) * counted_time(tried.best)
-    return tried.best is None or (sooner and not settings.effort.search.smooth)
+    sooner = before < (1.0 - SAME_TIME) * counted_time(tried.plan)
+    return sooner and (tried.best is None or not settings.effort.search.smooth)
 
 
 def _on_path(job: Job, settings: Settings, tried: Tried) -> Tried:
     """The motion on the path, delivered."""
-    plan = plan_on_path(job, settings, tried.path)
+    plan = plan_on_path(job, settings, tried.path, tried.laid)
     joint = tried.joint and tried.best is not None and faster(tried.best, plan) is tried.best
     best = plan if tried.best is None else faster(tried.best, plan)
     return dataclasses.replace(tried, best=best, path=None, joint=joint)
@@ -144,14 +145,14 @@ def _closed_form_may_be_faster(job: Job, settings: Settings, tried: Tried) -> bo
     on a path of a job that is not long."""
     if settings.corner != AUTO or (tried.joint and settings.effort.search.smooth):
         return False
-    stops_sooner = job.line_stop_time < counted_time(tried.best)
-    only_on_path = not tried.joint or filters_count(*job.real)
+    stops_sooner = job.line_stop_time < counted_time(tried.plan)
+    only_on_path = (tried.best is not None and not tried.joint) or filters_count(*job.real)
     return stops_sooner or (only_on_path and len(job.toolpath) <= KINEMATIC_MOST)
 
 
 def _closed_form(job: Job, settings: Settings, tried: Tried) -> Tried:
     """Method kinematic, and where it does not pass full stops at all blocks but lines that go straight on."""
-    best = tried.best
+    best = tried.plan
     limits = Limits.of(job.machine, job.toolpath.axes)
     if np.isinf([limits.tangential, limits.tangential_jerk]).all():  # which its corners do not keep
         rival = KinematicMethod().plan_job(job.faster_than(counted_time(best)))
@@ -176,54 +177,6 @@ ALONE, ON_PATH = ATTEMPTS[1:], ATTEMPTS[2:]
 def attempts_at(job: Job) -> tuple[Attempt, ...]:
     """The attempts for a job: one alone makes motions that do not begin or do not end at rest."""
     return IN_MOTION if any(job.toolpath.speeds) else ATTEMPTS
-
-
-class Retry(NamedTuple):
-    """Something that is tried once more, or in another way.
-
-    steps : in the trace, as they begin
-    when  : and what
-    most  : at most so often
-    worth : how much longer plans are without it, on the mean and at worst [-], or what it saves from failing
-    """
-
-    steps: tuple[str, ...]
-    when: str
-    most: str
-    worth: str
-
-
-# All that is tried once more. `python -m benchmarks.net.ablation ROWS --net NET --without STEP` plans without
-# it, on jobs of NET where it shows. Worth by these switches on those of 386 random jobs by the default
-# (jobs/random_lines.py 0 to 329, campaign 7000000 to 7000059) where they show and that plan fastest, 5 to 32 each:
-# runs alone, closed form, tighten, less for the period, slower in places; of the share of tolerance on 16 behind
-# filters. That of the search, once more, on 106 programs of benchmarks/judge/feed_promise.py, whose F changes at every
-# block; of the others by benchmarks/results/ablation.md.
-RETRIES = (
-    Retry(
-        ("search, once more",),
-        "the search has not ended: from a motion that stays where it fails",
-        "1",
-        "2e-2, 1.2",
-    ),
-    Retry(("runs alone",), "runs are not found, or the verdict finds something on few", "3", "1e-2, 2e-1"),
-    Retry(("closed form",), "there is but a motion on a path, or full stops are sooner", "2", "2e-2, 2e-1"),
-    Retry(("splines",), "full stops where a run gets no spline", "2", "3e-5, 6e-4"),
-    Retry(("corners",), "single ones between full stops, where they may be faster", "2", "2e-3, 2e-2"),
-    Retry(("tighten",), "limits, where they are exceeded between grid points", "2", "3e-5, 5e-4"),
-    Retry(("filters",), "less feed where the tolerance is left behind filters", "16", "5e-1, 3"),
-    Retry(("share of tolerance",), "behind long filters, less for the path", "2", "3e-3, 4e-2"),
-    Retry(
-        ("less for the period",), "chords between samples leave the tolerance", "8", "1e-1, 2e-1; saves plans"
-    ),
-    Retry(("slower in places",), "the verdict finds something", "6", "2e-2, 2e-1"),
-    Retry(
-        ("shaped",),
-        "a shaper that takes more than the tolerance: more limits, less tolerance; at last gently",
-        "5, 1",
-        "1e-1, 3e-1",
-    ),
-)
 
 
 def _others(

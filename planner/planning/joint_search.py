@@ -34,15 +34,13 @@ from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
 from planner.planning.job.by_run import RunsInTime, full_stops
 from planner.planning.job.job import Job
-from planner.planning.job.made import NO_TABLES, Delivered, Tables
-from planner.planning.job.plan import Plan
+from planner.planning.job.plan import NO_TABLES, Delivered, Plan, Tables
 from planner.planning.job.runs_alone import ALONE_MOST, Alone, with_runs_alone
-from planner.planning.joint_leads import between_leads, with_leads
-from planner.planning.joint_start import Start
+from planner.planning.joint_start import Start, between_leads, with_leads
 from planner.planning.optimal.effort import Search, Settings
 from planner.planning.optimal.notes import path_notes
 from planner.planning.optimal.on_path import OnPath
-from planner.planning.optimal.result import priced
+from planner.planning.optimal.path_motion import priced
 from planner.sensitivity.activity import history
 from planner.sensitivity.found_activity import found_history
 from planner.sensitivity.found_prices import found_prices
@@ -110,9 +108,9 @@ def joint_plan(
     """
     stays, led = motion is not None, with_leads(job)
     with job.stage("search") as report:
-        start = Start(motion or between_leads(planned.motion(), job, led), job, search.cut)
         runs = list(tube_runs_of(job.toolpath, job.machine, jerk_limited=settings.order.jerk_limited))
-        steps = sum(len(start.guess(k, run)) for k, run in enumerate(runs))
+        start = Start(motion or between_leads(planned.motion(), job, led), job, runs, search.cut)
+        steps = sum(map(len, start.guesses))
         most = search.steps_max
         if steps > search.small:  # no finer than what is delivered
             most = min(most, start.motion.end / job.machine.dt)
@@ -206,15 +204,16 @@ class InTwo(NamedTuple):
 
 def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo:
     """The solver as the effort has it."""
+    own = partial(TubeOwn, smooth=search.smooth)
     if stays and not search.finer:
-        return TubeOwn(search.gap, progress=report, smooth=search.smooth)
+        return own(search.gap, progress=report)
     ends = np.cumsum([0.0, *SEARCHES[: len(search.finer) + 1]])
     parts = pairwise((ends / ends[-1]).tolist())
     shares = [lambda done, a=a, b=b: report(a + done * (b - a)) for a, b in parts]
     return InTwo(
-        TubeOwn(search.gap, stays=False, progress=shares[0], smooth=search.smooth),
+        own(search.gap, stays=False, progress=shares[0]),
         tuple(
-            (cut, TubeOwn(gap, stays=stays, progress=share, smooth=search.smooth))
+            (cut, own(gap, stays=stays, progress=share))
             for (cut, gap), share in zip(search.finer, shares[1:], strict=True)
         ),
     )
@@ -224,7 +223,7 @@ def searched_runs(
     runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
 ) -> list[FoundRun]:
     """The solution on each run."""
-    size = np.array([len(start.guess(k, run)) for k, run in enumerate(runs)])
+    size = np.array([len(guess) for guess in start.guesses])
     order, done = np.argsort(-size, kind="stable").tolist(), np.zeros(len(runs))  # shares
 
     def one(k: int) -> Searching[FoundRun]:
@@ -247,7 +246,7 @@ def search_run(
     if isinstance(solver, InTwo):
         taken = yield from _in_two(k, run, start, solver)
     else:
-        guess = start.guess(k, run)
+        guess = start.guesses[k]
         taken = [(guess, (yield from search_with(solver, run, guess)))]
     found = FoundRun(run, Status.ACCEPTABLE, taken[-1][1].sentence)
     for guess, solution in taken:
@@ -266,13 +265,13 @@ def search_run(
 
 def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> Searching[list[tuple[Guess, TubeSolution]]]:
     """The steps from which each search began whose motion was taken, and its solution, the last one in the shortest steps."""
-    guess = start.guess(k, run)
+    guess = start.guesses[k]
     found = yield from solver.first.search(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
         if not solver.finer:
             return [(guess, found)]
         cut, own = solver.finer[0]
-        guess = start.guess_in(k, run, cut)
+        (guess,) = start.cut(k, [run], cut)
         return [(guess, (yield from own.search(run, guess)))]
     taken = [(guess, found)]
     for cut, own in solver.finer:

@@ -8,13 +8,14 @@
   shares     on machines with filters: all of that once more with less of the tolerance for the path
   finish     what limits and tolerance cost                                                                 sensitivity/
 
-Everything that is tried once more is in one table, `RETRIES` of planning/attempts.py.
+Everything that is tried once more is in one table, `RETRIES` of benchmarks/net/ablation.py.
 """
 
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -24,26 +25,56 @@ from planner.feedrate.constraints.limits import JERK, TANGENTIAL, TANGENTIAL_JER
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
-from planner.motion.timing import require_samples
+from planner.motion.timing import Motion, require_samples
 from planner.nc.extents import travel_faults
 from planner.nc.faults import require_none
 from planner.nc.program import Program
-from planner.planning.attempt import Attempt, Tried
 from planner.planning.job.by_run import RunsInTime, broken_runs, full_stops
 from planner.planning.job.choice import beside, faster, inside, not_in_step, passed, shown_time
 from planner.planning.job.job import Job
 from planner.planning.job.less_tolerance import with_less_tolerance
 from planner.planning.job.plan import Plan
 from planner.planning.job.runs_alone import with_runs_alone
-from planner.planning.job.stages import Progress, Stages
-from planner.planning.job.trace import Log
+from planner.planning.job.trace import Log, Progress, Stages
 from planner.planning.optimal.effort import Settings
+from planner.planning.optimal.geometry import Laid
+from planner.planning.optimal.on_path import OnPath
 from planner.sensitivity.path_prices import path_prices
 
 # Runs on which the verdict finds something are planned by themselves where they are no more of all [-].
 ALONE_SHARE = 0.1
 # Of motions in closed form less of the tolerance for the path may be faster (`Method.ways`).
 CLOSED_FORM_WAYS = ((1.0, 0.5), (0.8, 0.35), (0.25, 0.35), (0.1, 0.25))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tried:
+    """The outcome of the attempts so far."""
+
+    best: Plan | None = None  # the fastest plan; None before there is one
+    # the time-optimal motion on a path, its limits kept between grid points, not delivered; None before
+    path: tuple[OnPath, Motion] | None = None
+    # plans the motion `path` once, and what the joint search has planned of it is not planned again; None before
+    kept: Callable[[Job], tuple[OnPath, Motion] | None] | None = None
+    laid: Laid | None = None  # the splines of that path, where they are known
+    slower: Plan | None = None  # of a search whose motion passes only when it is run slower in places
+    joint: bool = False  # whether the best is of the joint search
+    steps: int = 0  # of constant jerk, that the joint search has
+    left: bool = True  # whether the joint search has anything to gain
+    began: float = float("inf")  # time of the motion that the joint search began with [s]
+
+    @property
+    def plan(self) -> Plan | None:
+        """The best plan, or the one that is run slower in places where there is no other; None before there is one."""
+        return self.best or self.slower
+
+
+class Attempt(NamedTuple):
+    """One way to a motion."""
+
+    name: str  # as the trace has it
+    applies: Callable[[Job, Settings, Tried], bool]  # whether it is made, after what was tried before
+    make: Callable[[Job, Settings, Tried], Tried]  # what is there after it
 
 
 class Method(ABC):
@@ -179,8 +210,8 @@ def best_of(attempts: tuple[Attempt, ...], job: Job, settings: Settings) -> Plan
         if attempt.applies(job, settings, tried):
             job.tell(attempt.name)
             tried = attempt.make(job, settings, tried)
-    assert tried.best is not None
-    return tried.best if tried.slower is None else beside(tried.best, tried.slower, job)
+    assert tried.plan is not None
+    return tried.plan if tried.slower is None or tried.best is None else beside(tried.best, tried.slower, job)
 
 
 def _runs_alone(job: Job, made: Plan, method: Method) -> Plan | None:

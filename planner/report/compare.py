@@ -25,7 +25,7 @@ from planner.report.summary import summary
 if TYPE_CHECKING:
     from planner.machine.user_limit import OwnLimit
     from planner.planning.job.plan import Plan
-    from planner.planning.job.stages import Progress
+    from planner.planning.job.trace import Progress
     from planner.planning.page import Method
     from planner.report.html.data import Samples
     from planner.verifier import Verdict

@@ -17,8 +17,7 @@ from planner.machine import load_machine
 from planner.motion.slowed import Slowed, reach
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job
-from planner.planning.job.stages import Stages
-from planner.planning.job.trace import Trace
+from planner.planning.job.trace import Stages, Trace
 from planner.planning.methods.kinematic import KinematicMethod
 from planner.planning.methods.registry import plan
 from planner.verifier.excess import Excess, Fault, Kind

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
-from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guess_from
+from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guesses_from
 from planner.joint.run import TubeRun, tube_runs_of
 from planner.machine import Axis, Machine
 from planner.machine.user_limit import JointLimit, PathLimit
@@ -88,4 +88,4 @@ def begun_on(program: Program, cut: Cut = DEFAULT_CUT, machine: Machine = MACHIN
     seen = OptimalMethod(corner="bezier").plan(program, free.with_own(machine.own)).require().trajectory
     times = np.maximum.accumulate(passing_times(seen, toolpath))
     times[-1] = seen.t[-1]
-    return run, guess_from(run, seen, times[run.first], cut)
+    return run, guesses_from([run], seen, [times[run.first]], cut)[0]

@@ -13,7 +13,7 @@ from benchmarks.jobs import problems, random_lines
 from planner.feedrate.solution import Status
 from planner.geometry.build import toolpath_from_program
 from planner.joint import stages
-from planner.joint.guess import guess_from
+from planner.joint.guess import guesses_from
 from planner.joint.nlp import TubeNLP
 from planner.joint.own import TubeOwn
 from planner.joint.run import tube_runs_of
@@ -35,7 +35,7 @@ def begun(slower: float):
     """The run of one line, and a guess from a motion that takes `slower` times the least time."""
     motion = along_x(LENGTH, JERK, slower=slower)
     seen = joined(list(dense_motion(motion, 1e-5)))
-    return line(), guess_from(line(), seen, np.array([0.0, motion.end]))
+    return line(), guesses_from([line()], seen, [np.array([0.0, motion.end])])[0]
 
 
 @pytest.mark.shows("tube", "exact: a line from rest to rest")

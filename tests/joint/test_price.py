@@ -12,7 +12,7 @@ import pytest
 from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.joint import price
-from planner.joint.guess import Guess, guess_from
+from planner.joint.guess import Guess, guesses_from
 from planner.joint.own import TubeOwn
 from planner.joint.run import TubeRun, tube_runs_of
 from planner.joint.shares import shares
@@ -60,7 +60,7 @@ def searched(name: str) -> Searched:
     seen = OptimalMethod(corner="bezier").plan(PROGRAMS[name], MACHINE).trajectory
     times = np.maximum.accumulate(passing_times(seen, toolpath))
     times[-1] = seen.t[-1]
-    first = found(run, guess_from(run, seen, times[run.first]).slower(1.02))
+    first = found(run, guesses_from([run], seen, [times[run.first]])[0].slower(1.02))
     return found(run, first.guess.slower(1.03))  # from where the searches with other limits begin, too
 
 

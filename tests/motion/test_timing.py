@@ -20,7 +20,7 @@ from planner.motion.timing import Motion, law_of_moves, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job
-from planner.planning.job.stages import Stages
+from planner.planning.job.trace import Stages
 from planner.planning.methods.optimal import OptimalMethod
 
 MACHINE = problems.machine()

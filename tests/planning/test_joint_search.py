@@ -20,8 +20,7 @@ from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.planning import joint_search
 from planner.planning.job.choice import beside
-from planner.planning.job.stages import Stages
-from planner.planning.job.trace import Trace
+from planner.planning.job.trace import Stages, Trace
 from planner.planning.methods.optimal import OptimalMethod
 from planner.planning.methods.stop import StopMethod
 from planner.planning.page import job_of

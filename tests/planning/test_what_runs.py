@@ -12,7 +12,7 @@ import planner
 from benchmarks.net import ablation
 from planner.feedrate.solution import Status
 from planner.joint.parts import FoundRun
-from planner.planning.attempts import ATTEMPTS, RETRIES
+from planner.planning.attempts import ATTEMPTS
 from planner.planning.job.job import Job
 from planner.planning.job.trace import Trace
 
@@ -41,15 +41,15 @@ def told_names() -> set[str]:
 
 
 def test_the_table_has_exactly_the_retries_that_a_trace_can_show() -> None:
-    retried = {step for retry in RETRIES for step in retry.steps}
+    retried = {step for retry in ablation.RETRIES for step in retry.steps}
     told = told_names() | {attempt.name for attempt in ATTEMPTS}
     first = {"joint search", "motion on the path"}  # one of them is the first attempt of every plan
     assert told - first - set(WAY) - set(TOLD) == retried
-    assert len(RETRIES) <= 12
+    assert len(ablation.RETRIES) <= 12
 
 
 def test_each_of_them_can_be_switched_off() -> None:
-    assert set(ablation.SWITCHES) - set(ablation.NUMBERS) == {retry.steps[0] for retry in RETRIES}
+    assert set(ablation.SWITCHES) - set(ablation.NUMBERS) == {retry.steps[0] for retry in ablation.RETRIES}
 
 
 def steps_of(text: str, **settings) -> list[str]:

@@ -28,7 +28,7 @@ from planner.nc.program import Program
 
 if TYPE_CHECKING:
     from planner.planning.job.plan import Plan
-    from planner.planning.job.stages import Progress
+    from planner.planning.job.trace import Progress
 
 
 TOLERANCE, FEED = "tolerance", "feed"

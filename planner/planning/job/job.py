@@ -28,11 +28,9 @@ from planner.motion.shaping import ShapedMotion
 from planner.motion.timing import MotionInTime, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
-from planner.planning.job.made import NO_TABLES, Delivered, Tables
 from planner.planning.job.notes import job_notes
-from planner.planning.job.plan import Making, Plan
-from planner.planning.job.stages import Stages
-from planner.planning.job.trace import Tell
+from planner.planning.job.plan import NO_TABLES, Delivered, Making, Plan, Tables
+from planner.planning.job.trace import Stages, Tell
 from planner.verifier import OF_CHORDS, verify
 
 NOT_ON_PATH = "the motion leaves the programmed path: the lines and blocks of the trajectory are those that the method planned"

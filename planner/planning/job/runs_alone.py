@@ -9,8 +9,7 @@ from planner.base.arrays import FloatArray
 from planner.joint.splice import Spliced, SplicedRun
 from planner.planning.job.by_run import RunsInTime, broken_runs, full_stops, job_of_run
 from planner.planning.job.job import Job
-from planner.planning.job.made import Delivered
-from planner.planning.job.plan import Plan
+from planner.planning.job.plan import Delivered, Plan
 
 # So many runs are planned by themselves, and so often more those that the verdict finds something on.
 ALONE_MOST, VERDICTS = 100, 3

@@ -11,7 +11,8 @@ Times are those of the processor, so that a trace says the same on a machine tha
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -48,6 +49,7 @@ class Step:
 
 
 Log = Callable[[Step], None]
+Progress = Callable[[str, float], None]
 
 
 # How a stage tells of a step: the name, then the other fields of `Step` by name, and facts.
@@ -121,3 +123,32 @@ def _said(value: Fact) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.4g}" if isinstance(value, float) else f"{value:,}" if isinstance(value, int) else value
+
+
+class Stages:
+    """Measures the time of the stages of a job, and tells the caller which stage is running.
+
+    timings  : seconds by stage; a stage that runs several times is summed up
+    progress : called with the stage's name and the fraction done
+    log      : called with every step
+    """
+
+    def __init__(self, progress: Progress | None = None, log: Log | None = None):
+        self.timings: dict[str, float] = {}
+        self.tell: Tell = tell_nobody if log is None else Teller(log)
+        self._progress = progress
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Callable[[float], None]]:
+        """Run a stage under the clock. Yields a function to call with the fraction done (0 to 1)."""
+        self._tell(name, 0.0)
+        began = time.perf_counter()
+        try:
+            yield lambda fraction: self._tell(name, fraction)
+        finally:
+            self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - began
+        self._tell(name, 1.0)
+
+    def _tell(self, name: str, fraction: float) -> None:
+        if self._progress is not None:
+            self._progress(name, fraction)

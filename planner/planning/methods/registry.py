@@ -31,8 +31,7 @@ from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.set_limits import limited
 from planner.planning.job.at_tip import chain_of, in_joints
 from planner.planning.job.plan import Plan
-from planner.planning.job.stages import Progress, Stages
-from planner.planning.job.trace import Log
+from planner.planning.job.trace import Log, Progress, Stages
 from planner.planning.page import Method
 
 DEFAULT_MACHINE = "mill"

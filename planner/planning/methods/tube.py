@@ -20,8 +20,7 @@ from planner.joint.solvers import TubeSolver, tube_solver
 from planner.joint.splice import Spliced
 from planner.nc.program import Program
 from planner.planning.job.job import Job
-from planner.planning.job.made import Delivered
-from planner.planning.job.plan import Plan
+from planner.planning.job.plan import Delivered, Plan
 from planner.planning.joint_search import OF_THE_START, said, search_run, tabled
 from planner.planning.joint_start import Start
 from planner.planning.methods.optimal import OptimalMethod
@@ -54,10 +53,10 @@ class TubeMethod(Method):
         if first.making is None:
             sentence = f"no motion to start from: {first.sentence}"
             return plan(None, status=first.status, sentence=sentence, grid_points=0)
-        start, found = Start(first.making.motion, job), list[FoundRun]()
+        start, found = Start(first.making.motion, job, runs), list[FoundRun]()
         with job.stage("solve") as report:
             for k, run in enumerate(runs):
-                steps = len(start.guess(k, run))
+                steps = len(start.guesses[k])
                 found += searched([search_run(k, run, start, solver, within=start.lasting(k))], steps)
                 report((k + 1) / len(runs))
         made, stays, why = _delivered(job, first, start, found)

@@ -18,6 +18,7 @@ from planner.machine import Machine
 from planner.planning.job.trace import Tell, tell_nobody
 from planner.smoothing.spline_path import SplineShape, lost_joints, spline_shape
 
+Laid = tuple[SmoothPath, SplineShape]  # a path with rounded corners, and the splines over it
 # Rounds of placing full stops; in the last one a run without a spline is fenced by two.
 STOP_ROUNDS = 2
 
@@ -40,7 +41,7 @@ def corner_shape(
 
 def splined_with_stops(
     rounded: SmoothPath, machine: Machine, blend_tangents: bool, tell: Tell = tell_nobody
-) -> tuple[SmoothPath, SplineShape]:
+) -> Laid:
     """The splines of a path, as they are laid, and the path with full stops where runs get none (module text)."""
     shape = spline_shape(rounded, machine)
     _tell_of(shape, tell, 0)

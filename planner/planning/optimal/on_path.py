@@ -15,6 +15,7 @@ from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.sampling.samples import PathSamples
 from planner.feedrate.solution import FeedrateSolution
 from planner.motion.timing import Motion, law_of_solution
+from planner.planning.optimal.geometry import Laid
 from planner.smoothing.spline_path import SplineShape
 
 
@@ -28,6 +29,7 @@ class OnPath:
     solution: FeedrateSolution  # the motion, or the status of a failure
     # what the path's splines are made of, if it has some
     shape: SplineShape | None = None
+    laid: Laid | None = None  # these as they were laid, with the path under them, for who lays no others
     notes: tuple[str, ...] = ()  # sentences on what was given up
 
     def faster_than(self, other: OnPath) -> bool:

@@ -18,25 +18,31 @@ from planner.base.names import AUTO, QUICK, SPLINE
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status
+from planner.machine import Machine
+from planner.motion.shaping import ShapedMotion
+from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
 from planner.planning.job.job import Job
-from planner.planning.job.made import Tables
-from planner.planning.job.plan import Plan
+from planner.planning.job.plan import NO_TABLES, Delivered, Plan, Tables
+from planner.planning.job.trace import Tell, tell_nobody
 from planner.planning.optimal.behind_filters import within_filters
 from planner.planning.optimal.compare_corners import corner_bounds, with_corners
 from planner.planning.optimal.effort import COARSE, EFFORTS, Grids, Settings
-from planner.planning.optimal.geometry import corner_shape, splined_with_stops
-from planner.planning.optimal.notes import no_spline_note, not_compared_note
+from planner.planning.optimal.geometry import Laid, corner_shape, splined_with_stops
+from planner.planning.optimal.notes import no_spline_note, not_compared_note, path_notes
 from planner.planning.optimal.on_path import OnPath
-from planner.planning.optimal.result import plan_of_solution, priced
 from planner.planning.optimal.tighten import within_limits
+from planner.sensitivity.activity import history
 from planner.smoothing.spline_path import with_spline
 
 
-def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
-    """The time-optimal motion on a smooth path, its limits kept between grid points too; None if none."""
+def kept_on_path(job: Job, settings: Settings, laid: Laid | None = None) -> tuple[OnPath, Motion] | None:
+    """The time-optimal motion on a smooth path, its limits kept between grid points too; None if none.
+
+    laid : its splines, if they have been laid (`OnPath.laid`)
+    """
     try:
-        found = time_optimal(job, settings)
+        found = time_optimal(job, settings, laid)
     except NotSolvedError:  # no grid follows the path
         return None
     if not found.solution.solved:
@@ -45,14 +51,17 @@ def kept_on_path(job: Job, settings: Settings) -> tuple[OnPath, Motion] | None:
         return within_limits(found, settings.order, job.toolpath, job.machine, job.tell)
 
 
-def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | None = None) -> Plan:
+def plan_on_path(
+    job: Job, settings: Settings, known: tuple[OnPath, Motion] | None = None, laid: Laid | None = None
+) -> Plan:
     """The plan on a smooth path: time-optimal, tightened where it exceeds a limit between grid points,
     delivered; without a trajectory if it takes longer than `job.most`.
 
     known : its motion, if there is one already (`kept_on_path`)
+    laid  : as there
     """
     try:
-        found = [known[0] if known else time_optimal(job, settings)]
+        found = [known[0] if known else time_optimal(job, settings, laid)]
     except NotSolvedError as fault:  # no grid follows the path
         return job.plan(
             None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0, sentence=str(fault)
@@ -75,17 +84,17 @@ def plan_on_path(job: Job, settings: Settings, known: tuple[OnPath, Motion] | No
     return plan_of_solution(job, best, made._replace(filtered=filtered), settings, tables)
 
 
-def time_optimal(job: Job, settings: Settings) -> OnPath:
-    """The time-optimal motion, limits kept at grid points, on rounded corners or on splines."""
+def time_optimal(job: Job, settings: Settings, laid: Laid | None = None) -> OnPath:
+    """The time-optimal motion, limits kept at grid points, on rounded corners or on splines; `laid`: as above."""
     order, machine = settings.order, job.machine
 
     # Geometry: corners rounded each by itself, or splines in their place; a full stop where a run gets none.
-    given = _rounded(job, settings)
     if settings.corner not in (AUTO, SPLINE):
+        given = _rounded(job, settings)
         return order.solve(given, job, grids_for(given, job, settings).final)
-    with job.stage("geometry"):
-        rounded, splines = splined_with_stops(given, machine, order.jerk_limited, job.tell)
+    rounded, splines = laid or _splined(job, settings, job.tell)
     if not splines.splines.fits.any():
+        given = _rounded(job, settings)
         cornered = order.solve(given, job, grids_for(given, job, settings).final)
         return dataclasses.replace(cornered, notes=no_spline_note(rounded, splines))
 
@@ -108,9 +117,7 @@ def first_motion(job: Job, settings: Settings) -> OnPath | None:
     """The time-optimal motion on splines, on a coarse grid and with its limits kept at grid points
     only, with a full stop where a run gets none; None where no run has one, where there is no solution, and
     where the splines have more spans than the steps that are searched."""
-    given = _rounded(job, settings)
-    with job.stage("geometry"):
-        rounded, shape = splined_with_stops(given, job.machine, settings.order.jerk_limited)
+    rounded, shape = _splined(job, settings)
     fits = shape.splines.fits
     if (len(fits) and not fits.any()) or shape.splines.span_first[-1] > settings.effort.search.steps_max:
         return None
@@ -118,7 +125,9 @@ def first_motion(job: Job, settings: Settings) -> OnPath | None:
         planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
     except NotSolvedError:  # no grid follows the splines
         return None
-    return planned.without_prices() if planned.solution.solved else None
+    if not planned.solution.solved:
+        return None
+    return dataclasses.replace(planned.without_prices(), laid=(rounded, shape))
 
 
 def _rounded(job: Job, settings: Settings) -> SmoothPath:
@@ -126,6 +135,13 @@ def _rounded(job: Job, settings: Settings) -> SmoothPath:
     with job.stage("geometry"):
         shape = corner_shape(settings.corner, job.machine, job.toolpath, settings.bezier)
         return round_corners(job.toolpath, job.machine, shape, blend_tangents=settings.order.jerk_limited)
+
+
+def _splined(job: Job, settings: Settings, tell: Tell = tell_nobody) -> Laid:
+    """Splines over the runs between full stops."""
+    given = _rounded(job, settings)
+    with job.stage("geometry"):
+        return splined_with_stops(given, job.machine, settings.order.jerk_limited, tell)
 
 
 def grids_for(path: SmoothPath, job: Job, settings: Settings) -> Grids:
@@ -136,3 +152,36 @@ def grids_for(path: SmoothPath, job: Job, settings: Settings) -> Grids:
     with job.stage("geometry"):
         coarse = sample_path(path, job.machine, COARSE, third_order=settings.order.jerk_limited)
     return settings.effort.grids(len(coarse))
+
+
+def plan_of_solution(
+    job: Job, best: OnPath, made: Delivered | None, settings: Settings, tables: Tables = NO_TABLES
+) -> Plan:
+    """The plan of a solution and what was delivered of it, None unless solved."""
+    grid = None
+    notes: tuple[str, ...] = ()
+    if made is not None:
+        delivered = made.motion
+        if isinstance(delivered, ShapedMotion):
+            delivered = delivered.motion  # what the solution is of
+        with job.stage("report"):
+            grid = history(best.problem, best.solution, *times_of_pieces(delivered))
+        notes = (*path_notes(job.toolpath, best), *best.notes)
+    return job.plan(
+        made,
+        method=settings.method,
+        corner=settings.corner_name,
+        solver=best.solution.solver,
+        status=best.solution.status,
+        sentence=best.solution.sentence,
+        grid_points=len(best.samples),
+        tables=dataclasses.replace(tables, grid=grid),
+        notes=notes,
+    )
+
+
+def priced(best: OnPath, machine: Machine) -> bool:
+    """Whether the limits of a motion have prices: not where it has no jerk limits or its solver does not
+    tell, nor behind filters, of which the problem knows only a part."""
+    solution = best.solution
+    return solution.jerk_limited and solution.multipliers is not None and machine.fir is None

@@ -35,7 +35,6 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.machine import Fir, Machine
 from planner.motion.shaping import ShapedMotion, Shaper, shaper_of
 from planner.motion.timing import Motion
-from planner.planning.attempt import Tried
 from planner.planning.attempts import ATTEMPTS
 from planner.planning.job.by_run import RunsInTime
 from planner.planning.job.choice import counted_time, faster, passed
@@ -43,10 +42,9 @@ from planner.planning.job.job import BOLDER, Job
 from planner.planning.job.plan import Plan
 from planner.planning.optimal.effort import Settings
 from planner.planning.optimal.on_path import OnPath
-from planner.planning.optimal.path_motion import time_optimal
-from planner.planning.optimal.result import plan_of_solution
+from planner.planning.optimal.path_motion import plan_of_solution, time_optimal
 from planner.planning.optimal.settling import Settling
-from planner.planning.page import tolerant
+from planner.planning.page import Tried, tolerant
 
 # Corners that turn by more are stops of p [rad].
 SHARP = float(np.deg2rad(20.0))

@@ -13,7 +13,7 @@ from planner.geometry.toolpath import Joint
 from planner.nc.reader import parse_program
 from planner.planning.job.by_run import full_stops, job_of_run
 from planner.planning.job.job import Job
-from planner.planning.job.stages import Stages
+from planner.planning.job.trace import Stages
 from planner.planning.methods.optimal import OptimalMethod
 
 

@@ -7,7 +7,7 @@ import pytest
 import planner
 from planner.base.errors import InputError
 from planner.machine import Machine, load_machine
-from planner.planning.job.cutting import cutting_notes
+from planner.planning.job.notes import cutting_notes
 
 MILL = load_machine("mill")
 

@@ -8,7 +8,7 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Fir, Machine
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job
-from planner.planning.job.stages import Stages
+from planner.planning.job.trace import Stages
 from planner.planning.methods.fir import FirMethod
 from planner.planning.methods.fir_spline import FirSplineMethod
 from planner.planning.methods.kinematic import KinematicMethod

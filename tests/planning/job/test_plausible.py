@@ -7,7 +7,7 @@ import pytest
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine, builtin_machines, load_machine
 from planner.nc.reader import parse_program
-from planner.planning.job.plausible import short_block_notes, unit_notes
+from planner.planning.job.notes import short_block_notes, unit_notes
 
 MILL = load_machine("mill")
 

@@ -19,8 +19,7 @@ from planner.joint.own import WINDOW
 from planner.machine import Fir
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job
-from planner.planning.job.stages import Stages
-from planner.planning.job.trace import Trace
+from planner.planning.job.trace import Stages, Trace
 from planner.planning.methods.optimal import SIGMA2, OptimalMethod
 from planner.planning.optimal.effort import EFFORTS, Search
 

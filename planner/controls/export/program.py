@@ -30,6 +30,7 @@ from planner.controls.export.output import FIRST_RUN, assumptions
 from planner.controls.timing.models import CONTROLS as MODELS
 from planner.controls.timing.models import predicted_times
 from planner.controls.timing.times import feed_in_force, standing
+from planner.motion.trajectory import require_rest
 from planner.planning.job.plan import Plan
 
 # Of the room for chords: wider ones need fewer lines, narrower ones turn less at each.
@@ -59,7 +60,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     tolerance : of the path [mm], which plan and chords share
 
     Where the plan leaves no room for chords the program's own path is written, and a note says so. Raises
-    InputError if the motion leaves the program, for a program with the tool centre point on, and with its
+    InputError if the motion leaves the program or is not from rest to rest, for a program with the tool centre point on, and with its
     line for what the control has no words for.
     """
     if plan.joints is not None:
@@ -68,6 +69,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
             "planned feeds, and --for linuxcnc-stream and --for pvt play the setpoints of its joints",
             source=plan.program.source,
         )
+    require_rest(plan.trajectory is None or plan.trajectory.from_rest_to_rest)
     job = Candidates(plan, CONTROLS[control], tolerance)
     linuxcnc = control == LINUXCNC.name
     found = linuxcnc_candidates(job) if linuxcnc else _candidates(job)

@@ -39,7 +39,6 @@ from planner.report.figure import (
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
 from planner.report.plotly_figure import PROGRAMMED, colourings, fitted_scene, panel_figure
-from planner.report.rows import plan_rows
 from planner.report.summary import json_ready, summary
 from planner.report.units import Units, axis_titles, units_of
 
@@ -68,7 +67,7 @@ def report_page(
         raise ValueError("report_page: the plan has no trajectory; see plan.sentence")
     columns, about = _columns(plan, units_of(plan.program, units))
     columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
-    about["summary"] = told = {"told": plan_rows(plan)} | (said or summary(plan))
+    about["summary"] = told = said or summary(plan)
     names = list(dict.fromkeys([*about["limits"], *(told.get("held_by") or ())]))
     about["colours"] = dict(zip(names, limit_colours(names), strict=True))
     return page_of("report", "planned", told["program"], about, columns, PICTURE=path_picture(plan, PICTURE))

@@ -12,7 +12,7 @@
     element("verdict").textContent = passed ? "passed" : "failed";
     element("verdict").className = passed ? "passed" : "failed";
     // Words and figures are those of the terminal: summary.told. The header has some of them, the table "In words" all.
-    const told = summary.told || [], header = ["cycle time", "stopping at every block", "beside the motion", "total", "contour error", "corners missed by"];
+    const told = summary.told || [], header = ["cycle time", "saved", "beside the motion", "total", "contour error", "corners missed by"];
     for (const [name, value] of told) {
       const line = make("tr");
       line.append(make("th", name), make("td", value));

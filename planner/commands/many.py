@@ -107,7 +107,7 @@ def plan_many(
         pool = ThreadPoolExecutor(max_workers=many)
         try:
             running = [pool.submit(task.run) for task in tasks]
-            progress.count(0, len(jobs), 0)
+            progress.count(0, len(jobs))
             for future in as_completed(running):
                 found = future.result()
                 done[found.job] = found
@@ -115,7 +115,7 @@ def plan_many(
                     time = found.summary.get("cycle_time_s")
                     took = "" if time is None else f"{time:.4f} s, "
                     say(f"{found.job}: {took}{found.outcome}", err=True)
-                progress.count(len(done), len(jobs), 0)
+                progress.count(len(done), len(jobs))
         except KeyboardInterrupt:
             interrupted = True
             pool.shutdown(wait=False, cancel_futures=True)

@@ -63,7 +63,7 @@ class ProgressBar(kernel_files.Compilation):
         times = self._times.get(stage, 1)
         self._show(f"{stage}, pass {times}" if times > 1 else stage, fraction)
 
-    def count(self, there: int, of: int, _before: int) -> None:
+    def count(self, there: int, of: int) -> None:
         """Show that so many of some plans are there."""
         self._show(f"{there:,} of {of:,} plans", there / of, stage="plans")
 

@@ -43,7 +43,7 @@ def brief_rows(plan: Plan, units: Units) -> Rows:
     if plan.grid is not None:
         ranked = [(limit_text(name), round(100.0 * share)) for name, share in plan.grid.ranked()]
         told = [f"{name} {percent} %" for name, percent in ranked if percent][:LIMITS]
-        rows.append(("limited by", f"{', '.join(told)} of the time, some together"))
+        rows.append(("limited by", f"{', '.join(told)} of the time{', some together' * (len(told) > 1)}"))
     rows.append(("tolerance used", _used(plan, units)))
     failed = "; ".join([FAILED, *first_of(plan.verdict.sentences, FAULTS)])
     return [*rows, (VERDICT, PASSED if plan.verdict.passed else failed)]
@@ -70,7 +70,8 @@ def tool_times(plan: Plan) -> dict[str, float]:
         return {}
     lasting = planned_blocks(plan.trajectory, plan.toolpath).duration
     blocks = np.bincount(plan.toolpath.block, lasting, len(plan.program)) + plan.program.dwell
-    return by_name(blocks, names)
+    found = by_name(blocks, names)
+    return found if len(found) > 1 else {}
 
 
 def limit_text(name: str) -> str:

@@ -87,7 +87,7 @@ def saved_rows(plan: Plan) -> Rows:
         return [("saved", "not known")]
     saved, gain = takes - time, NOTHING
     if saved > SAVED_SHOWN * takes:
-        gain, why = f"{saved:.4g} s, {100.0 * saved / takes:.0f} %", ""
+        gain, why = f"{saved:.4g} s, {100.0 * saved / takes:.2g} %", ""
     return [("saved", f"{gain}, against {other}{why}: {takes:.4f} s of motion")]
 
 

@@ -46,13 +46,12 @@ def sweep(
     varied: Sequence[Varied],
     folder: SweepFolder,
     cluster: str | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Sweep:
     """Plan all combinations that the folder does not have yet, and keep each as soon as it is done.
 
     cluster  : address of a Dask scheduler; None for processes of this machine
-    progress : called with the number of points that are there, of how many, and how many of them were there
-               before
+    progress : called with the number of points that are there, and of how many
 
     Raises InputError if a point cannot be written or there is no such scheduler, NotSolvedError if processes
     die.
@@ -62,14 +61,14 @@ def sweep(
     reused = len(rows)
     missing = [point for point in points if point not in rows]
     if progress is not None:
-        progress(reused, len(points), reused)
+        progress(reused, len(points))
     if missing:
         found = planned_here(job, missing) if cluster is None else planned_on_cluster(cluster, job, missing)
         for point, row in found:
             folder.keep(point, row)
             rows[point] = row
             if progress is not None:
-                progress(len(rows), len(points), reused)
+                progress(len(rows), len(points))
     return Sweep(varied=tuple(varied), rows=tuple(rows[point] for point in points), reused=reused)
 
 

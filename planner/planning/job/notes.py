@@ -12,7 +12,7 @@ from planner.machine import ROTARY_AXES, Machine
 from planner.nc.extents import travel_faults
 from planner.nc.program import Kind, Program
 from planner.planning.job.cutting import cutting_notes
-from planner.planning.job.plausible import short_block_notes, unit_notes
+from planner.planning.job.plausible import inch_notes, short_block_notes, unit_notes
 
 # A tolerance above this share of the part's extent is noted [-]: little is left of a part's shape.
 TOLERANCE_OF_PART = 0.02
@@ -28,6 +28,7 @@ def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[st
         *_travel_notes(program, machine),
         *cutting_notes(program, machine),
         *unit_notes(machine),
+        *inch_notes(program, machine),
         *_feed_notes(program, machine),
         *_spline_notes(program, toolpath),
         *_extruder_notes(toolpath),

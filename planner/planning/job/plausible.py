@@ -5,8 +5,11 @@ A machine file in m, mm/min or ms is valid, and its plan passes every check. So 
 
 import numpy as np
 
+from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, Machine
+from planner.nc.points import in_inches, own_text
+from planner.nc.program import Program
 
 # Velocities [mm/s] outside of which a number is rather in m/s (6 m/h) or in mm/min (900 m/min).
 VELOCITY_MIN, VELOCITY_MAX = 1.67, 15_000.0
@@ -35,6 +38,19 @@ def unit_notes(machine: Machine) -> list[str]:
         unit = "ms" if machine.dt > PERIOD_MAX else "another unit"
         notes.append(f"the interpolation period dt is {machine.dt:g} s: is the number in {unit}?")
     return notes
+
+
+def inch_notes(program: Program, machine: Machine) -> list[str]:
+    """A sentence where a program in inches asks for more than any axis can: it may be one in mm."""
+    fed = np.where(np.isfinite(program.feed), program.feed, 0.0)
+    most = max((machine.axes[axis].velocity for axis in LINEAR_AXES if axis in machine.axes), default=np.inf)
+    if fed.max(initial=0.0) <= most or not in_inches(program, own_text(program) or b""):
+        return []
+    k, unit = int(fed.argmax()), MM_PER_INCH / SECONDS_PER_MINUTE
+    return [
+        f"line {program.line[k]}: F{fed[k] / unit:.5g} in inches (G20) is more than any axis can, {most / unit:.5g} in/min: is the "
+        "program in mm (G21)?"
+    ]
 
 
 def short_block_notes(toolpath: Toolpath) -> list[str]:

@@ -162,7 +162,8 @@ def what_if_table(job: StudiedJob, rows: Sequence[WhatIf], title: str) -> Group:
 
 
 def _notes(row: Row) -> list[str]:
-    return (row.summary or {}).get("notes", [])
+    notes: list[str] = (row.summary or {}).get("notes", [])
+    return notes
 
 
 def foretold_text(foretold: Forecast | None) -> str:

@@ -1,8 +1,5 @@
-"""The command line: every command under its name, and faults of its use in plain words.
-
-typer's messages are for programmers, and lack the one hint that helps. A file where a command belongs
-(`planner part.nc`) is answered with the command; a misspelt option with the one that is near, not with every
-option that resembles it; what is missing with what its help says.
+"""The command line: every command under its name, and faults of its use in plain words, with the one hint that helps:
+the command for a file that stands where one belongs, the one option that is near, what is missing by its help.
 """
 
 import difflib

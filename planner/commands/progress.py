@@ -1,9 +1,5 @@
-"""Progress of a long job on standard error: a bar of the stage that runs on a terminal, a line now and then
-elsewhere.
-
-The share is what a stage tells of itself, and the time left is what rich makes of that: of the stage, not of
-the job, and nothing where the stage tells none.
-"""
+"""Progress of a long job on standard error: a bar of the stage that runs on a terminal, a line now and then elsewhere.
+Share and time left are those of the stage."""
 
 from __future__ import annotations
 

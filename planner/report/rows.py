@@ -1,8 +1,5 @@
-"""The rows on a plan and on a verdict: one list of labels and texts, which the terminal prints,
-`summary.json` holds under `told`, and the report and the card of a notebook show. Nothing else puts these
-figures into words. Those of the active limits, of what more of them would save and of the corners where tolerance
-saves most come from sensitivity/activity.py and sensitivity/prices.py.
-"""
+"""The rows on a plan and on a verdict: one list of labels and texts, which the terminal prints, `summary.json` holds under
+`told`, and report and card show. Nothing else puts these figures into words."""
 
 from __future__ import annotations
 

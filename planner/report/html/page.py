@@ -1,12 +1,7 @@
-"""The file `report.html`: one page with everything in it, plotly's script too, so that it opens without a
-network.
+"""The file `report.html`: one page with everything in it, plotly's script too, so that it opens without a network.
 
-Columns of numbers are compressed (gzip) and written as base64; the page unpacks them with the browser's own
-DecompressionStream. Texts of the program and of names are data as well, and the page shows them as text, so
-that nothing in a program is ever run.
-
-The first picture needs none of that: it is in the page as SVG, and the header is filled before plotly's
-script, some five megabytes, is run and the columns are unpacked.
+Columns of numbers are compressed and in base64; the browser's DecompressionStream unpacks them. Texts of the program are
+data that is shown and never run. The first picture is SVG, seen before plotly's five megabytes are run.
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
-"""`planner plan` with several programs: each in a process of its own, as many at a time as there are cores.
-
-A process each, because a program that uses the memory up, or finds a bug, then ends alone. Its command line
-is that of one program, with `--json` and its share of the threads. What it writes stands in DIR/NAME, all of
-it or nothing, so that Ctrl-C loses only what was not finished.
+"""`planner plan` with several programs: each in a process of its own, so that one that fails ends alone, as many at a time
+as there are cores. What it writes stands in DIR/NAME, all or nothing, so that Ctrl-C loses only what was not finished.
 """
 
 import json

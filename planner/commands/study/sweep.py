@@ -1,10 +1,7 @@
-"""Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table
-and a picture.
+"""Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table and a picture.
 
-The points are planned by processes of this machine (joblib), or by the workers of a Dask cluster. Both call
-`planned_point` with the same job and hand the rows back as they come; the process that asks writes
-the files, so that workers need no file system in common. A point whose worker died is given to another one:
-by Dask, up to `DEATHS` times; a local process that dies ends the sweep, and the points so far are kept.
+Processes of this machine (joblib) or workers of a Dask cluster call `planned_point`; the process that asks writes the
+files. A point whose worker died is given to another one, up to `DEATHS` times; a local process that dies ends the sweep.
 """
 
 import dataclasses

@@ -1,5 +1,4 @@
-"""`planner machine`: the built-in machines, a machine file to start from, from a control's settings, or from how long
-test programs took."""
+"""`planner machine`: built-in machines, and files from a template, a control's settings or measured times."""
 
 import os
 from pathlib import Path

@@ -1,15 +1,8 @@
-"""Kernels compiled ahead: at installation, what the first plans will need.
+"""Kernels compiled at installation, what the first plans will need: `python -m planner.commands.ahead [corners]`.
 
-    python -m planner.commands.ahead [corners]
-
-plans three programs with the usual method and bounds their times, which compiles what is not kept yet, and
-prints the files of all kernels that this has used. What another method or a curve of another kind needs is
-compiled when it is first used.
-
-Compiling is nearly all of it, and numba compiles one kernel at a time. So `setup.py` runs it twice, side by
-side, the second time with `corners`: three moves that need not be read, on corners that need no splines. That
-comes to geometry, path, feedrate, samples and verdict while the first compiles the reading and the splines;
-and then the last of the programs. Both keep their kernels in the same place, and each loads what it finds.
+Three programs are planned and bounded; files of all kernels used are printed. numba compiles one kernel at a time, so
+`setup.py` runs it twice, side by side: with `corners` three moves on corners come to geometry, feedrate and verdict
+while the other compiles reading and splines. Both keep their kernels in one place, and load what is there.
 """
 
 import sys

@@ -1,8 +1,5 @@
-"""The command line: every command under its name, and faults of its use in plain words.
-
-typer's messages are for programmers, and lack the one hint that helps. A file where a command belongs
-(`planner part.nc`) is answered with the command; a misspelt option with the one that is near, not with every
-option that resembles it; what is missing with what its help says.
+"""The command line: every command under its name, and faults of its use in plain words, with the one hint that helps:
+the command for a file that stands where one belongs, the one option that is near, what is missing by its help.
 """
 
 import difflib
@@ -83,7 +80,7 @@ class PlainGroup(TyperGroup):
 def _plain(fault: Any, options: list[str]) -> None:
     """Change the message of a usage fault, in place."""
     wrong = getattr(fault, "option_name", None)
-    if getattr(fault, "possibilities", None) and wrong:
+    if type(fault).__name__ == "NoSuchOption":
         near = difflib.get_close_matches(wrong, options, n=1, cutoff=NEAR)
         near = ["--vary NAME=RANGE"] if wrong == "--set" and "--vary" in options else near
         fault.message = f"no option {wrong}" + (f"; did you mean {near[0]}?" if near else "")

@@ -96,10 +96,14 @@ def _planned(
 
 def _show(found: ControlTimes, said: dict[str, Any]) -> None:
     """Print the table."""
+    from planner.report.rows import hours_text
     from planner.report.tables import pairs_table
 
+    def clock(seconds: float) -> str:
+        return f"{seconds:.4f} s{hours_text(seconds)}"
+
     table = pairs_table()
-    takes = f"{found.seconds:.4g} s" if found.seconds < 1 else _clock(found.seconds)
+    takes = f"{found.seconds:.4g} s" if found.seconds < 1 else clock(found.seconds)
     table.add_row(f"{found.control} takes", takes)
     if found.dwells:
         table.add_row("of that standing still", f"{found.dwells:.4f} s")
@@ -110,7 +114,7 @@ def _show(found: ControlTimes, said: dict[str, Any]) -> None:
         longest = {*sorted(parts, key=parts.__getitem__, reverse=True)[:ROWS]}
         for name, seconds in parts.items():
             if name in longest:
-                table.add_row(f"  {name or 'before'}", _clock(seconds))
+                table.add_row(f"  {name or 'before'}", clock(seconds))
         if len(parts) > ROWS:
             table.add_row(f"  {len(parts) - ROWS} more {title}", "see --json")
     if made := said.get("plan"):
@@ -119,10 +123,3 @@ def _show(found: ControlTimes, said: dict[str, Any]) -> None:
         for name, seconds in made["exported_s"].items():
             table.add_row(f"exported, {name}", f"{seconds:.4f} s")
     show(table)
-
-
-def _clock(seconds: float) -> str:
-    """Seconds, and hours and minutes beside them where there are some."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{seconds:.4f} s" + (f" ({hours}:{minutes:02d}:{rest:02d})" if seconds >= 60 else "")

@@ -19,7 +19,6 @@ from planner.commands.terminal import FAILED, guarded, say, say_json
 
 if TYPE_CHECKING:
     from planner.motion.pulses import AxisPulses
-    from planner.motion.trajectory import Trajectory
     from planner.planning.job.plan import Plan
 
 
@@ -117,7 +116,6 @@ def export_command(
     with _new_directory(output) as new:
         read = read_trajectory(trajectory_file(plan))
         trajectory = read.trajectory
-        _require_rest(trajectory, plan)
         if len(trajectory.extruder):
             raise InputError(_NO_EXTRUDER, source=str(plan))
         machine = read.metadata.get("machine")
@@ -186,26 +184,14 @@ def _saved(plan: Path) -> Plan:
     """The plan of a directory. Raises InputError for a trajectory file, which has no program."""
     from planner.report.html.saved import saved_plan
 
-    if not plan.is_dir():
-        there = "" if plan.exists() else "no such directory; "
-        text = f"{there}give the directory that 'plan -o' wrote: the program is needed too"
-        raise InputError(text, source=str(plan))
+    _require_directory(plan, ": the program is needed too")
     return saved_plan(plan)[0]
 
 
-# A file rests where it is slower than this share of its fastest [-]: digits of files, velocities from differences.
-AT_REST = 1e-3
-
-
-def _require_rest(trajectory: Trajectory | None, source: Path) -> None:
-    """Raises InputError for a motion that begins or ends in motion (a plan without a motion passes): what is
-    written is run from rest to rest."""
-    if trajectory is not None and (trajectory.feed[[0, -1]] > AT_REST * trajectory.feed.max()).any():
-        text = (
-            "the motion begins or ends in motion, and controls and drives run files from rest to rest: "
-            "plan it without start_speed and end_speed"
-        )
-        raise InputError(text, source=str(source))
+def _require_directory(plan: Path, why: str = "") -> None:
+    if not os.path.isdir(plan):  # False, too, for names that are too long
+        there = "" if os.path.exists(plan) else "no such directory; "
+        raise InputError(f"{there}give the directory that 'plan -o' wrote{why}", source=str(plan))
 
 
 def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> None:
@@ -214,7 +200,6 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
 
     with _new_directory(output) as new:
         saved = _saved(plan)
-        _require_rest(saved.trajectory, plan)
         allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
         made = write_program(new, saved, for_.value, allowed)
     _say_assumed(saved.program.assumptions)
@@ -261,7 +246,6 @@ def pulses_command(
     drive = Drive(frequency_max=max_frequency, width=None if pulse_width is None else pulse_width * 1e-6)
     trajectory = trajectory_file(trajectory)
     read = read_trajectory(trajectory)
-    _require_rest(read.trajectory, trajectory)
     trains = pulses_of(read.trajectory, wanted)
     faults = overrun(trains, drive)
     if output is not None and not faults:
@@ -313,8 +297,7 @@ def report_command(
     force: options.ForceOption = False,
 ) -> None:
     """Write a page of a plan that opens in a browser: path, profiles, NC lines, corners, verdict."""
-    if not os.path.isdir(directory):
-        raise InputError("give the directory that 'plan -o' wrote", source=str(directory))
+    _require_directory(directory)
     from planner.report.html.page import REPORT, report_page
     from planner.report.html.saved import saved_plan
     from planner.report.replace import check_file, write_whole

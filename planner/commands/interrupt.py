@@ -1,10 +1,8 @@
 """Ctrl-C ends the command at once, with exit code 130 and without half-written files.
 
-The handler does not raise KeyboardInterrupt: numba's dispatcher turns an exception that arrives while a
-kernel returns into a SystemError, and callbacks of C libraries and destructors swallow one. Leaving at once
-is safe, since a file takes its place only when it is written completely (report/replace.py); the temporaries
-are removed first. Python runs the handler between two of its instructions, so a running kernel is waited for,
-but nothing after it happens.
+The handler raises no KeyboardInterrupt, which numba's dispatcher, callbacks of C libraries and destructors swallow or
+change. To leave at once is safe: a file takes its place only when it is whole (report/replace.py), and temporaries
+are removed first. A running kernel is waited for.
 """
 
 import os

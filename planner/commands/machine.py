@@ -1,5 +1,4 @@
-"""`planner machine`: the built-in machines, a machine file to start from, from a control's settings, or from how long
-test programs took."""
+"""`planner machine`: built-in machines, and files from a template, a control's settings or measured times."""
 
 import os
 from pathlib import Path
@@ -202,7 +201,11 @@ def _measured(text: str) -> "tuple[str, float, Trace | None]":
             raise InputError(
                 f"'{text}': write a program and its seconds or its trace, as in x.nc=61.2 or x.nc=x.csv, or a trace"
             ) from None
-        trace = read_trace(took)
+        try:
+            trace = read_trace(took)
+        except InputError as fault:
+            needed = "a trace, or of a program its seconds: x.nc=61.2"
+            raise InputError(f"{fault.message}; give {needed}", source=took, line=fault.line) from None
         return file, trace.seconds, trace
     if not file or not 0.0 < seconds < float("inf"):
         raise InputError(f"'{text}': write a program and its seconds above 0, as in x.nc=61.2")

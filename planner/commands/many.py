@@ -1,8 +1,5 @@
-"""`planner plan` with several programs: each in a process of its own, as many at a time as there are cores.
-
-A process each, because a program that uses the memory up, or finds a bug, then ends alone. Its command line
-is that of one program, with `--json` and its share of the threads. What it writes stands in DIR/NAME, all of
-it or nothing, so that Ctrl-C loses only what was not finished.
+"""`planner plan` with several programs: each in a process of its own, so that one that fails ends alone, as many at a time
+as there are cores. What it writes stands in DIR/NAME, all or nothing, so that Ctrl-C loses only what was not finished.
 """
 
 import json
@@ -107,7 +104,7 @@ def plan_many(
         pool = ThreadPoolExecutor(max_workers=many)
         try:
             running = [pool.submit(task.run) for task in tasks]
-            progress.count(0, len(jobs), 0)
+            progress.count(0, len(jobs))
             for future in as_completed(running):
                 found = future.result()
                 done[found.job] = found
@@ -115,7 +112,7 @@ def plan_many(
                     time = found.summary.get("cycle_time_s")
                     took = "" if time is None else f"{time:.4f} s, "
                     say(f"{found.job}: {took}{found.outcome}", err=True)
-                progress.count(len(done), len(jobs), 0)
+                progress.count(len(done), len(jobs))
         except KeyboardInterrupt:
             interrupted = True
             pool.shutdown(wait=False, cancel_futures=True)

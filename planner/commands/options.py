@@ -1,5 +1,4 @@
-"""Arguments and options that several commands share; the names they may take come from
-`planner.base.names`."""
+"""Arguments and options that several commands share; names come from `planner.base.names`."""
 
 import functools
 import inspect

@@ -155,7 +155,7 @@ def plan_command(
         if verbose:
             show(*assumed_lines(result.program.assumptions), plan_table(result, said["notes"]))
         else:
-            show(brief_table(result, shown_in, said["notes"], tolerance))
+            show(brief_table(result, shown_in, said["notes"]))
         if corners:
             show("", corners_table(result.corners, shown_in) or NO_CORNERS)
         if written:

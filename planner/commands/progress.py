@@ -1,9 +1,5 @@
-"""Progress of a long job on standard error: a bar of the stage that runs on a terminal, a line now and then
-elsewhere.
-
-The share is what a stage tells of itself, and the time left is what rich makes of that: of the stage, not of
-the job, and nothing where the stage tells none.
-"""
+"""Progress of a long job on standard error: a bar of the stage that runs on a terminal, a line now and then elsewhere.
+Share and time left are those of the stage."""
 
 from __future__ import annotations
 
@@ -63,7 +59,7 @@ class ProgressBar(kernel_files.Compilation):
         times = self._times.get(stage, 1)
         self._show(f"{stage}, pass {times}" if times > 1 else stage, fraction)
 
-    def count(self, there: int, of: int, _before: int) -> None:
+    def count(self, there: int, of: int) -> None:
         """Show that so many of some plans are there."""
         self._show(f"{there:,} of {of:,} plans", there / of, stage="plans")
 

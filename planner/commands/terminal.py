@@ -1,9 +1,5 @@
-"""How a command reports: messages, tables on standard output, progress on standard error.
-
-Does a failure come of too little memory? Libraries say so in many ways, and some only that they cannot be
-loaded. Under a limit of the address space (`ulimit -v`, batch systems) the first that does not fit is often a shared
-library: the loader then reports a segment that cannot be mapped, and llvmlite only a library that cannot be
-found.
+"""How a command reports: messages, tables on standard output, progress on standard error; and whether a failure comes of
+too little memory, which libraries say in many ways, some only that one cannot be loaded (under `ulimit -v`).
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
 """`planner verify`: judge a trajectory file.
 
-The command line says what to judge it against. Without -m and --tolerance a file that `plan` wrote is judged
-with its own machine and tolerance, and its program is read as it was for the plan, unless the command line
-has settings of the reader; the output says so. With -m the tolerance is that of the machine, unless the
-program (G64 P) or --tolerance sets another. Limits that a file declares as not kept are reported, and judged
-all the same.
+Without -m and --tolerance it is judged with its own machine and tolerance, and its program read as it was for the plan
+unless settings of the reader are given; the output says so. Limits that a file declares as not kept are judged too.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ _SETTINGS = re.compile(
     r"^\s*(\[(EMC\w*|TRAJ|AXIS_\w|printer)\]|\$\d+\s*=|(echo:)?\s*M20[13]\s+X)", re.MULTILINE
 )
 
+_PROGRAM = re.compile(r"^\s*/?(N\d+\s*)?([GMT]\d|[XYZ][-+.\d])", re.MULTILINE | re.IGNORECASE)
 SIZE_MAX = 1_000_000  # bytes of a machine file: ten thousand tools
 # A key of more parts than there are tables in tables.
 _DEEP = re.compile(r"^[^=\n#]*(?:\.[^=\n#.]*){50}", re.MULTILINE)
@@ -45,6 +46,9 @@ def load_machine(path: str | Path) -> Machine:
         settings *= bool(_SETTINGS.search(text))
         is_toml = isinstance(fault, tomllib.TOMLDecodeError)
         reason = fault if is_toml else "a number has more than 4,300 digits"
+        if _PROGRAM.search(text):
+            said = f"an NC program, where a machine file is needed: a TOML file, or one of {', '.join(builtin_machines())}"
+            raise InputError(said, source=source) from None
         decimal = _DECIMAL.search(text)
         comma = f"; decimals have a point: {decimal[1]}.{decimal[2]}" if decimal else ""
         raise InputError(f"not valid TOML: {reason}{comma}{settings}", source=source) from fault

@@ -43,6 +43,7 @@ class AxisPulses:
     direction: Array  # (n,) +1 or -1
     line: Array  # (n,) source line of the NC program
     per_period: Array  # (T-1,) pulses between two samples, up minus down
+    rests: bool = True  # whether the motion goes from rest to rest
 
     def __post_init__(self) -> None:
         pulses = len(self.time)
@@ -167,6 +168,7 @@ def _axis_pulses(trajectory: Trajectory, k: int, steps: float) -> AxisPulses:
         direction=direction,
         line=np.repeat(trajectory.line[:-1], number),
         per_period=per_period,
+        rests=trajectory.from_rest_to_rest,
     )
 
 

@@ -10,10 +10,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.machine import ROTARY_AXES
 
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
+
+
+# A motion rests where it is slower than this share of its fastest [-]: digits of files, velocities from differences.
+AT_REST = 1e-3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -75,6 +80,11 @@ class Trajectory:
         return float(self.t[-1] - self.t[0])
 
     @property
+    def from_rest_to_rest(self) -> bool:
+        """Whether it is slower at both ends than `AT_REST` of its fastest."""
+        return bool((self.feed[[0, -1]] <= AT_REST * self.feed.max()).all())
+
+    @property
     def in_degrees(self) -> FloatArray:
         """(A,) what turns positions and their derivatives into mm and degrees."""
         return in_degrees(self.axes, self.radius)
@@ -118,6 +128,15 @@ class AnyMotion(Protocol):
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) [s]; `dt` [s] is the trajectory's interpolation period."""
         ...
+
+
+def require_rest(rests: bool) -> None:
+    """Raise InputError for a motion that is not `from_rest_to_rest`: what controls and drives run is."""
+    if not rests:
+        raise InputError(
+            "the motion begins or ends in motion, and controls and drives run files from rest to rest: plan it without "
+            "start_speed and end_speed"
+        )
 
 
 def in_degrees(axes: tuple[str, ...], radius: float) -> FloatArray:

@@ -1,8 +1,5 @@
 """A plan in eight lines for the people at the machine: time, tools, what is saved, what limits, tolerance,
 verdict, notes, files. report/rows.py has all the rest.
-
-What is saved is told against the planner of the control that the machine names (controls/timing/times.py), else
-against a stop at every block.
 """
 
 from __future__ import annotations
@@ -12,11 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.base.errors import InputError
-from planner.controls.timing.times import TIMED, ControlTimes, by_name, control_times, tools_of
+from planner.controls.timing.times import by_name, tools_of
 from planner.feedrate.constraints.limits import TANGENTIAL
 from planner.planning.job.notes import tolerance_notes
-from planner.report.rows import FAILED, PASSED, SAVED_SHOWN, VERDICT, Rows, beside_rows, first_of, hours_text
+from planner.report.rows import FAILED, PASSED, VERDICT, Rows, beside_rows, first_of, hours_text, saved_rows
 from planner.report.units import Units
 from planner.report.word_feed import planned_blocks
 
@@ -26,11 +22,6 @@ if TYPE_CHECKING:
 NOTES, LIMITS, TOOLS, FAULTS = 3, 4, 6, 2  # that are told
 DIGITS = 6  # behind the point of lengths: what is less is rounding
 QUANTITIES = {"velocity": "speed", "acceleration": "acceleration", "jerk": "jerk", "power": "drive power"}
-NAMES = {
-    "linuxcnc": "LinuxCNC",
-    "klipper": "Klipper",
-    "marlin": "Marlin",
-}  # of controls, as they write themselves
 FURTHER = {
     "feed": "the programmed feed",
     TANGENTIAL.name: "acceleration along the path",
@@ -39,11 +30,8 @@ FURTHER = {
 }
 
 
-def brief_rows(plan: Plan, units: Units, tolerance: float | None = None) -> Rows:
-    """Labels and texts of time, tools, what is saved and what limits, tolerance and verdict.
-
-    tolerance : that was asked for [mm]; None for that of the program or the machine
-    """
+def brief_rows(plan: Plan, units: Units) -> Rows:
+    """Labels and texts of time, tools, what is saved and what limits, tolerance and verdict."""
     if plan.trajectory is None or plan.verdict is None:
         return [("time", "-"), (VERDICT, f"not solved: {plan.sentence}")]
     rows: Rows = [("time", _time(plan))]
@@ -51,12 +39,11 @@ def brief_rows(plan: Plan, units: Units, tolerance: float | None = None) -> Rows
     if tools:
         said = first_of([f"{name or 'before'} {seconds:.4g} s" for name, seconds in tools.items()], TOOLS)
         rows.append(("tools", ", ".join(said)))
-    if plan.method != "stop" or plan.machine.control is not None:
-        rows.append(("saved", _saved(plan, tolerance)))
+    rows += saved_rows(plan)
     if plan.grid is not None:
         ranked = [(limit_text(name), round(100.0 * share)) for name, share in plan.grid.ranked()]
         told = [f"{name} {percent} %" for name, percent in ranked if percent][:LIMITS]
-        rows.append(("limited by", f"{', '.join(told)} of the time, some together"))
+        rows.append(("limited by", f"{', '.join(told)} of the time{', some together' * (len(told) > 1)}"))
     rows.append(("tolerance used", _used(plan, units)))
     failed = "; ".join([FAILED, *first_of(plan.verdict.sentences, FAULTS)])
     return [*rows, (VERDICT, PASSED if plan.verdict.passed else failed)]
@@ -83,22 +70,8 @@ def tool_times(plan: Plan) -> dict[str, float]:
         return {}
     lasting = planned_blocks(plan.trajectory, plan.toolpath).duration
     blocks = np.bincount(plan.toolpath.block, lasting, len(plan.program)) + plan.program.dwell
-    return by_name(blocks, names)
-
-
-def control_of(plan: Plan, tolerance: float | None = None) -> ControlTimes | None:
-    """What the control that the machine names takes for the program as it is; None where it names none, or
-    where there is no model of that, or none for this program.
-
-    tolerance : as of `brief_rows`
-    """
-    control = plan.machine.control
-    if control is None or control.name not in TIMED:
-        return None
-    try:
-        return control_times(plan.program, plan.machine, control.name, tolerance)
-    except InputError:
-        return None
+    found = by_name(blocks, names)
+    return found if len(found) > 1 else {}
 
 
 def limit_text(name: str) -> str:
@@ -117,26 +90,6 @@ def _time(plan: Plan) -> str:
     missing = beside.get("not in the total") or beside.get("not in the cycle time")
     of = f": motion {motion:.4f} s, {beside['beside the motion']}" if "beside the motion" in beside else ""
     return f"{total:.4f} s{hours_text(total)}{of}" + (f"; without {missing}" if missing else "")
-
-
-def _saved(plan: Plan, tolerance: float | None) -> str:
-    assert plan.trajectory is not None
-    time, found = plan.trajectory.cycle_time, control_of(plan, tolerance)
-    if found is None and np.isfinite(plan.machine.powers(plan.toolpath.axes)).any():
-        return "not known: a stop at every block is planned without the limits of drive power"
-    if found is None:
-        other, takes = "a stop at every block", plan.stop_time
-    else:
-        other = f"{NAMES.get(found.control, found.control)}'s own planner (our model of it)"
-        takes = found.seconds
-    if not np.isfinite(takes):
-        return "not known"
-    saved = takes - time
-    if saved > SAVED_SHOWN * takes:
-        return f"{saved:.4g} s, {100.0 * saved / takes:.0f} %, against {other}: {takes:.4f} s of motion"
-    limited = plan.verdict is not None and "jerk" not in plan.verdict.not_limited
-    why = ", which limits no jerk," if found is not None and limited else ""
-    return f"nothing: {other}{why} takes {takes:.4f} s of motion"
 
 
 def _used(plan: Plan, units: Units) -> str:

@@ -22,6 +22,7 @@ from planner.report.summary import versions
 from planner.report.tables import outcome_text, outcomes_table, titled
 
 SUFFIXES = (".json", ".csv")
+NOTES_SHOWN = 3  # of those that all methods have
 QUANTITIES = ("velocity", "acceleration", "jerk", "feed", NORMAL)
 
 
@@ -54,7 +55,10 @@ def comparison_table(rows: list[Row], title: str) -> Group:
         table.add_row(row.method, *(text(row) for _, text in columns), outcome_text(row.outcome))
     said = [Text(f"{row.method}: {row.sentence}") for row in rows if not row.passed]
     free = [f"{row.method} does not limit {', '.join(row.free)}" for row in rows if row.free]
-    notes = [Text(f"(in brackets: not limited; {'; '.join(free)})")] if free else []
+    every = [(row.summary or {}).get("notes", []) for row in rows if row.summary]
+    shared = [note for note in every[0] if all(note in of for of in every)] if every else []
+    notes = [Text(f"note: {note}") for note in shared[:NOTES_SHOWN]]
+    notes += [Text(f"(in brackets: not limited; {'; '.join(free)})")] if free else []
     return titled(title, table, *notes, *said)
 
 

@@ -1,9 +1,5 @@
-"""The figures of a motion, described once: matplotlib draws it on paper (profiles_figure.py,
-plots.py), plotly in notebooks (report/interactive/page.py) and in pages (html/), for which
-plotly_figure.py puts it into plotly's words.
-
-A figure is panels, one above the other over one axis; a panel is series, and each of these names a column of
-numbers.
+"""The figures of a motion, described once, for matplotlib (profiles_figure.py, plots.py) and plotly (plotly_figure.py):
+panels above each other over one axis, of series that each name a column of numbers.
 """
 
 from __future__ import annotations

@@ -149,7 +149,11 @@ def check_output(directory: Path, names: Iterable[str], *, force: bool = False) 
         if not os.access(there, os.W_OK):
             raise InputError(f"cannot be written: no permission to write in {there}", source=str(directory))
         if missing:  # whether one can be made there (not below /proc)
-            os.rmdir(tempfile.mkdtemp(dir=there))
+            try:
+                os.rmdir(tempfile.mkdtemp(dir=there))
+            except OSError:
+                said = f"cannot be written: no directory can be made in {there}; give another one"
+                raise InputError(said, source=str(directory)) from None
         _refuse_foreign(directory, names, _vouched(directory), force)
 
 

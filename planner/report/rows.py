@@ -1,18 +1,17 @@
-"""The rows on a plan and on a verdict: one list of labels and texts, which the terminal prints,
-`summary.json` holds under `told`, and the report and the card of a notebook show. Nothing else puts these
-figures into words. Those of the active limits, of what more of them would save and of the corners where tolerance
-saves most come from sensitivity/activity.py and sensitivity/prices.py.
-"""
+"""The rows on a plan and on a verdict: one list of labels and texts, which the terminal prints, `summary.json` holds under
+`told`, and report and card show. Nothing else puts these figures into words."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planner.base.errors import InputError
 from planner.base.names import SINGLE_CORNERS
 from planner.base.units import MICROMETRE, SECONDS_PER_MINUTE
+from planner.controls.timing.times import TIMED, ControlTimes, control_times
 from planner.nc.extents import block_boxes, work_box
 
 if TYPE_CHECKING:
@@ -40,11 +39,7 @@ def plan_rows(plan: Plan) -> Rows:
     if plan.trajectory is not None:
         time = plan.trajectory.cycle_time
         rows.append(("cycle time", f"{time:.4f} s{hours_text(time)}"))
-        if plan.method != "stop" and np.isfinite(plan.stop_time):
-            times = f"{plan.stop_time:.4f} s, {plan.stop_time / time:.2f} times as long"
-            free = np.isfinite(plan.machine.powers(plan.toolpath.axes)).any()
-            times += "; without the limits of drive power" if free else ""
-            rows.append(("stopping at every block", times))
+        rows += saved_rows(plan)
         if plan.least_time:  # 0 where the tolerance allows to stay where one is
             above = 100.0 * (time / plan.least_time - 1.0)
             said = f"{plan.least_time:.4f} s or more, certified; this motion is {above:.2g} % above that"
@@ -64,6 +59,48 @@ def plan_rows(plan: Plan) -> Rows:
     stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in plan.timings.items())
     computing = f"{sum(plan.timings.values()):.2f}: {stages}" if stages else "-"
     return [*rows, ("computing time [s]", computing), ("solution", plan.sentence)]
+
+
+# Of controls, as they write themselves.
+NAMES = {"linuxcnc": "LinuxCNC", "klipper": "Klipper", "marlin": "Marlin"}
+
+
+def saved_rows(plan: Plan) -> Rows:
+    """What is saved against the planner of the control that the machine names, else against a stop at every block."""
+    if plan.method == "stop" and plan.machine.control is None:
+        return []
+    assert plan.trajectory is not None
+    time, found = plan.trajectory.cycle_time, control_of(plan)
+    other, takes, why = "a stop at every block", plan.stop_time, ""
+    if found is not None:
+        other, takes = (
+            f"{NAMES.get(found.control, found.control)}'s own planner (our model of it)",
+            found.seconds,
+        )
+        why = ", which limits no jerk" if plan.verdict and "jerk" not in plan.verdict.not_limited else ""
+    elif np.isfinite(plan.machine.powers(plan.toolpath.axes)).any():
+        return [("saved", "not known: a stop at every block is planned without the limits of drive power")]
+    if not np.isfinite(takes):
+        return [("saved", "not known")]
+    saved, gain = takes - time, NOTHING
+    if saved > SAVED_SHOWN * takes:
+        gain, why = f"{saved:.4g} s, {100.0 * saved / takes:.2g} %", ""
+    return [("saved", f"{gain}, against {other}{why}: {takes:.4f} s of motion")]
+
+
+def control_of(plan: Plan) -> ControlTimes | None:
+    """What the control that the machine names takes for the program as it is; None where it names none, or
+    where there is no model of that, or none for this program."""
+    control, tolerance = plan.machine.control, plan.toolpath.tolerance
+    if control is None or control.name not in TIMED:
+        return None
+    same = (
+        float(tolerance[0]) if (tolerance == tolerance[0]).all() else None
+    )  # which --tolerance may have given
+    try:
+        return control_times(plan.program, plan.machine, control.name, same)
+    except InputError:
+        return None
 
 
 def extent_rows(low: FloatArray, high: FloatArray, work: tuple[FloatArray, FloatArray] | None) -> Rows:
@@ -226,35 +263,6 @@ def _seconds(prices: PriceList, name: str) -> str:
     return f"{least:.2g} to {most:.2g} s"
 
 
-def price_summary(prices: PriceList) -> dict[str, Any]:
-    """The prices of a plan in numbers."""
-    from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE
-
-    dear = prices.corners
-    return {
-        "limits": prices.limits,
-        "feed": prices.feed,
-        "tolerance": prices.tolerance,
-        "more_limit": MORE_LIMIT,
-        "more_tolerance_mm": MORE_TOLERANCE,
-        "saved_s": prices.saved,
-        "saved_range_s": {name: list(between) for name, between in prices.ranges.items()},
-        "hints": list(prices.hints),
-        "corners": None
-        if dear is None
-        else [
-            {
-                "line": dear.line[k],
-                "position_mm": dear.position[k],
-                "theta_deg": np.rad2deg(dear.theta[k]),
-                "price_s_per_mm": dear.price[k],
-                "saved_s": dear.saved[k],
-            }
-            for k in range(len(dear))
-        ],
-    }
-
-
 def beside_rows(beside: Sequence[Beside], cycle_time: float, dwell: float) -> list[tuple[str, str]]:
     """Rows of the table of a plan: dwells, what takes time beside the motion, the total, and what is not in
     it.
@@ -282,24 +290,6 @@ def beside_rows(beside: Sequence[Beside], cycle_time: float, dwell: float) -> li
 
 def _counted(it: Beside) -> str:
     return f"{it.count:,} {it.what}" + ("s" if it.count > 1 and not it.what.startswith("M") else "")
-
-
-def beside_summary(plan: Plan) -> dict[str, Any]:
-    """The auxiliary time: how often, how long each, the sum, and the total with the motion [s]; None where
-    a time is not known. `dwell_s` is part of the cycle time."""
-    beside = plan.beside
-    seconds = sum(it.seconds for it in beside)
-    return {
-        "dwell_s": float(plan.program.dwell.sum()),
-        "counted": [
-            {"what": it.what, "count": it.count, "each_s": it.each}
-            | ({"because": it.because} if it.each is None else {})
-            for it in beside
-        ],
-        "known_s": seconds,
-        "total_s": None if plan.trajectory is None else plan.trajectory.cycle_time + seconds,
-        "complete": all(it.each is not None for it in beside),
-    }
 
 
 def hours_text(seconds: float) -> str:

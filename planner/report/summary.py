@@ -15,11 +15,12 @@ from planner.base.arrays import FloatArray
 from planner.nc.info import PLACES_SHOWN
 from planner.nc.program import ToolPoint
 from planner.report.brief import tool_times
-from planner.report.rows import beside_summary, plan_rows, price_summary
+from planner.report.rows import plan_rows
 
 if TYPE_CHECKING:
     from planner.nc.info import ProgramInfo
     from planner.planning.job.plan import Plan
+    from planner.sensitivity.records import PriceList
 
 NO_CORNERS = {"count": 0, "worst_speed_ratio": None}  # of a plan without a motion
 PACKAGES = ("numpy", "scipy", "numba", "toppra", "pyarrow")
@@ -78,6 +79,53 @@ def tool_point_summary(point: ToolPoint | None) -> dict[str, Any] | None:
     """Where the tool centre point is on, and the tool's length; None where x, y and z are those of the
     joints."""
     return None if point is None else dataclasses.asdict(point)
+
+
+def price_summary(prices: PriceList) -> dict[str, Any]:
+    """The prices of a plan in numbers."""
+    from planner.sensitivity.prices import MORE_LIMIT, MORE_TOLERANCE  # scipy
+
+    dear = prices.corners
+    return {
+        "limits": prices.limits,
+        "feed": prices.feed,
+        "tolerance": prices.tolerance,
+        "more_limit": MORE_LIMIT,
+        "more_tolerance_mm": MORE_TOLERANCE,
+        "saved_s": prices.saved,
+        "saved_range_s": {name: list(between) for name, between in prices.ranges.items()},
+        "hints": list(prices.hints),
+        "corners": None
+        if dear is None
+        else [
+            {
+                "line": dear.line[k],
+                "position_mm": dear.position[k],
+                "theta_deg": np.rad2deg(dear.theta[k]),
+                "price_s_per_mm": dear.price[k],
+                "saved_s": dear.saved[k],
+            }
+            for k in range(len(dear))
+        ],
+    }
+
+
+def beside_summary(plan: Plan) -> dict[str, Any]:
+    """The auxiliary time: how often, how long each, the sum, and the total with the motion [s]; None where
+    a time is not known. `dwell_s` is part of the cycle time."""
+    beside = plan.beside
+    seconds = sum(it.seconds for it in beside)
+    return {
+        "dwell_s": float(plan.program.dwell.sum()),
+        "counted": [
+            {"what": it.what, "count": it.count, "each_s": it.each}
+            | ({"because": it.because} if it.each is None else {})
+            for it in beside
+        ],
+        "known_s": seconds,
+        "total_s": None if plan.trajectory is None else plan.trajectory.cycle_time + seconds,
+        "complete": all(it.each is not None for it in beside),
+    }
 
 
 def versions() -> dict[str, str]:

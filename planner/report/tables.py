@@ -57,12 +57,9 @@ def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
     return titled(_title(plan), _pairs(plan_rows(plan)), *below)
 
 
-def brief_table(
-    plan: Plan, units: Units, notes: Sequence[str] | None = None, tolerance: float | None = None
-) -> Group:
-    """The plan in eight lines, as report/brief.py says; `notes` and what else it takes as there, None for those of
-    the plan."""
-    table = _pairs(brief_rows(plan, units, tolerance))
+def brief_table(plan: Plan, units: Units, notes: Sequence[str] | None = None) -> Group:
+    """The plan in eight lines, as report/brief.py says; `notes` as there, None for those of the plan."""
+    table = _pairs(brief_rows(plan, units))
     above, below = note_lines(plan, plan.notes if notes is None else notes)
     first = [Text(line, style="yellow") for line in above]
     return Group(*first, titled(_title(plan), table, *map(Text, below)))

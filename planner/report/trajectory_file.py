@@ -38,7 +38,7 @@ from planner.base.errors import InputError
 from planner.base.sizes import SIZES
 from planner.machine import EXTRUDER, LINEAR_AXES, ROTARY_AXES
 from planner.motion.pulses import AxisPulses
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory, require_rest
 from planner.report.replace import PULSES, replacing_file
 from planner.report.trajectory_reader import CSV_METADATA, FORMATS, PREFIXES, Format, read_trajectory
 
@@ -190,8 +190,10 @@ SUFFIXES = (".parquet", ".csv")
 def write_pulses(path: str | Path, trains: tuple[AxisPulses, ...], about: dict[str, Any]) -> None:
     """Write pulses with `about` as their metadata.
 
-    Raises InputError for a suffix other than .parquet and .csv, and for a place that cannot be written.
+    Raises InputError for a suffix other than .parquet and .csv, a place that cannot be written, and a motion that is not
+    from rest to rest.
     """
+    require_rest(all(train.rests for train in trains))
     path = Path(path)
     if path.suffix not in SUFFIXES:
         raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(SUFFIXES)}", source=str(path))

@@ -85,7 +85,8 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
     if read is None and not os.path.exists(path):
         raise InputError("trajectory file not found", source=str(path))
     if read is None:
-        raise InputError(f"unknown format '{path.suffix}'; there are {', '.join(FORMATS)}", source=str(path))
+        text = f"unknown format '{path.suffix}' of a trajectory; there are {', '.join(FORMATS)}"
+        raise InputError(f"{text}, and directories that 'plan -o' wrote", source=str(path))
     try:
         require_ending(path)
         given, text = read(path)

@@ -54,7 +54,7 @@ def test_time_is_left_of_a_stage_that_tells_its_share(bars: list[rich.progress.P
 def test_plans_that_are_there_are_a_share_of_all(bars: list[rich.progress.Progress]) -> None:
     with ProgressBar() as bar:
         for there in range(4):
-            bar.count(there, 8, 0)
+            bar.count(there, 8)
         (task,) = bars[0].tasks
         assert task.description == "3 of 8 plans"
         assert task.percentage == pytest.approx(37.5)

@@ -33,7 +33,8 @@ JOB = "G21 F3000\nG1 X10\nY5\n"
             "'20 min' is no time above 0; write one in s, or",
         ),
         (["plan", "part.nc", "--tolerance", "0,05"], "decimals have a point"),
-        (["report", "nowhere"], "nowhere: give the directory that 'plan -o' wrote"),
+        (["plan", "part.nc", "--control", "grbl"], "no option --control"),
+        (["report", "nowhere"], "nowhere: no such directory; give the directory that 'plan -o' wrote"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -116,3 +117,26 @@ def test_files_that_are_not_what_the_option_asks_for_are_recognised(
         done = run("plan", *words)
         assert done.exit_code == 2
         assert said in done.output.replace("\n", " ")
+
+
+def test_a_program_in_the_place_of_another_file_is_named(tmp_path: Path) -> None:
+    job = tmp_path / "part.nc"
+    job.write_text(JOB)
+    for words, said in (
+        (("time", job, "-m", job), "an NC program, where a machine file is needed"),
+        (("verify", job), "unknown format '.nc' of a trajectory; there are parquet"),
+        (("machine", "fit", job), "give a trace, or of a program its seconds: x.nc=61.2"),
+    ):
+        done = run(*words)
+        assert done.exit_code == 2
+        assert said in done.output
+
+
+def test_a_tolerance_larger_than_the_part_is_told_by_studies_too(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(JOB)
+    said = "the part's largest extent"
+    asked = ("what-if", tmp_path / "part.nc", "--method", "stop", "--set", "tolerance=300")
+    assert "note: tolerance=300" in run(*asked).output
+    assert said in run(*asked).output
+    done = run("compare", tmp_path / "part.nc", "--method", "stop", "--tolerance", "300")
+    assert said in done.output

@@ -6,6 +6,11 @@ from typer.testing import CliRunner
 
 import planner
 from planner.commands.app import app
+from planner.controls.export.program import write_program
+from planner.controls.export.stream import write_stream
+from planner.controls.export.tables import Table, write_table
+from planner.motion.pulses import pulses_of
+from planner.report.trajectory_file import write_pulses
 
 MILL = planner.load_machine("mill")
 FEED = 100.0
@@ -54,6 +59,25 @@ def test_it_is_not_exported_to_what_starts_from_rest(ends, control, tmp_path):
     assert result.exit_code == 2
     assert "begins or ends in motion" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("ends", [{}, {"start_speed": 40.0}, {"end_speed": 40.0}])
+def test_whoever_writes_files_of_it_is_refused(ends, tmp_path):
+    plan = planned(LEGS, **ends)
+    motion, written = plan.trajectory, tmp_path / "pulses.csv"
+    trains = pulses_of(motion, {"x": 400.0, "y": 400.0})
+    for write in (
+        lambda: write_program(tmp_path, plan, "grbl", 0.02),
+        lambda: write_stream(tmp_path, motion),
+        lambda: write_table(tmp_path, motion, Table()),
+        lambda: write_pulses(written, trains, {}),
+    ):
+        if not ends:
+            write()
+            continue
+        with pytest.raises(planner.InputError, match="begins or ends in motion"):
+            write()
+    assert written.exists() == (not ends)
 
 
 def test_to_begin_in_motion_takes_less_time_the_faster_it_is():

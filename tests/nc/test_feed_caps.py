@@ -220,7 +220,7 @@ def test_what_cannot_be_capped_is_refused(tmp_path: Path) -> None:
     (tmp_path / "caps.csv").write_text("line,feed\n2,100\n")
     for command in ("smooth", "expand"):
         assert (
-            "No such option"
+            "no option --feed-caps"
             in run(command, tmp_path / "job.ngc", "--feed-caps", tmp_path / "caps.csv").output
         )
 

@@ -14,8 +14,8 @@ from planner.controls.timing.times import control_times
 from planner.machine import ControlData, load_machine
 from planner.nc.reader import parse_program
 from planner.planning.job.beside import Beside
-from planner.report.brief import brief_rows, control_of, limit_text, tool_times
-from planner.report.rows import plan_rows
+from planner.report.brief import brief_rows, limit_text, tool_times
+from planner.report.rows import NAMES, control_of, plan_rows
 from planner.report.summary import summary
 from planner.report.tables import brief_table
 from planner.report.units import UNITS, units_of
@@ -35,9 +35,9 @@ def test_what_is_saved_against_a_stop_and_never_less_than_nothing() -> None:
         "0.45 s, 36 %, against a stop at every block"
     )
     plan.stop_time = plan.trajectory.cycle_time * (1.0 + 1e-15)  # rounding
-    assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith("nothing: a stop at every block")
+    assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith("nothing, against a stop at every block")
     plan.stop_time = 0.5
-    assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith("nothing: a stop at every block")
+    assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith("nothing, against a stop at every block")
 
 
 def test_what_is_saved_against_the_control_that_the_machine_names() -> None:
@@ -106,6 +106,20 @@ def test_the_times_of_tools_are_those_of_the_motion() -> None:
         planner.read_program(text=job.replace("T2 M6", ""), machine=machine), machine, method="stop"
     )
     assert summary(one)["tools_s"] == {}
+    still = planner.plan(
+        planner.read_program(text="T1 M6\nG1 X10 F600\nT2 M6\n", machine=machine), machine, method="stop"
+    )
+    assert tool_times(still) == {}, "one that moves"
+
+
+def test_page_and_terminal_compare_with_the_same() -> None:
+    plan = make_plan()
+    for name in (None, "grbl"):
+        if name:
+            plan.machine = plan.machine.model_copy(update={"control": ControlData(name=name)})
+        saved = dict(brief_rows(plan, UNITS["mm"]))["saved"]
+        assert dict(plan_rows(plan))["saved"] == dict(summary(plan)["told"])["saved"] == saved
+        assert (NAMES.get(name or "", name or "stop")) in saved
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ def text(table: RenderableType | None) -> str:
 def test_plan() -> None:
     said = text(plan_table(make_plan()))
     assert "0.8000 s" in said
-    assert "1.2500 s, 1.56 times as long" in said
+    assert "0.45 s, 36 %, against a stop at every block: 1.2500 s of motion" in said
     assert "x 0.5, y 1.000001" in said
     assert "x 3.5  (not limited by this method)" in said
     assert "12.300 µm" in said

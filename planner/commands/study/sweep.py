@@ -1,10 +1,7 @@
-"""Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table
-and a picture.
+"""Sweeps: a job planned with every combination of values of some settings, kept point by point, as a table and a picture.
 
-The points are planned by processes of this machine (joblib), or by the workers of a Dask cluster. Both call
-`planned_point` with the same job and hand the rows back as they come; the process that asks writes
-the files, so that workers need no file system in common. A point whose worker died is given to another one:
-by Dask, up to `DEATHS` times; a local process that dies ends the sweep, and the points so far are kept.
+Processes of this machine (joblib) or workers of a Dask cluster call `planned_point`; the process that asks writes the
+files. A point whose worker died is given to another one, up to `DEATHS` times; a local process that dies ends the sweep.
 """
 
 import dataclasses
@@ -46,13 +43,12 @@ def sweep(
     varied: Sequence[Varied],
     folder: SweepFolder,
     cluster: str | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Sweep:
     """Plan all combinations that the folder does not have yet, and keep each as soon as it is done.
 
     cluster  : address of a Dask scheduler; None for processes of this machine
-    progress : called with the number of points that are there, of how many, and how many of them were there
-               before
+    progress : called with the number of points that are there, and of how many
 
     Raises InputError if a point cannot be written or there is no such scheduler, NotSolvedError if processes
     die.
@@ -62,14 +58,14 @@ def sweep(
     reused = len(rows)
     missing = [point for point in points if point not in rows]
     if progress is not None:
-        progress(reused, len(points), reused)
+        progress(reused, len(points))
     if missing:
         found = planned_here(job, missing) if cluster is None else planned_on_cluster(cluster, job, missing)
         for point, row in found:
             folder.keep(point, row)
             rows[point] = row
             if progress is not None:
-                progress(len(rows), len(points), reused)
+                progress(len(rows), len(points))
     return Sweep(varied=tuple(varied), rows=tuple(rows[point] for point in points), reused=reused)
 
 

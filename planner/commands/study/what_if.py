@@ -133,14 +133,15 @@ def _of_one(prices: PriceList, setting: Setting, machine: Machine, tolerance: fl
 
 
 REASONS_SHOWN = 5  # why points did not pass
+NOTES_SHOWN = 2  # that a change brings
 
 
 def what_if_table(job: StudiedJob, rows: Sequence[WhatIf], title: str) -> Group:
     """Rows of `what_if` side by side, followed by the reason for each one that did not pass."""
     headings = ("cycle\ntime s", "change\ns", "estimate\ns", "change\n%", "contour\nµm")
     table = outcomes_table(["change", "from"], headings)
-    said = []
-    time = rows[0].row.cycle_time
+    said: list[Text] = []
+    time, as_it_is = rows[0].row.cycle_time, _notes(rows[0].row)
     for it in rows:
         row, change = it.row, it.change if it.settings else None
         table.add_row(
@@ -154,7 +155,15 @@ def what_if_table(job: StudiedJob, rows: Sequence[WhatIf], title: str) -> Group:
         )
         if not row.passed:
             said.append(Text(f"{it.label}: {row.sentence}"))
+        said += [Text(f"note: {it.label}: {note}") for note in _notes(row) if note not in as_it_is][
+            :NOTES_SHOWN
+        ]
     return titled(title, table, *said)
+
+
+def _notes(row: Row) -> list[str]:
+    notes: list[str] = (row.summary or {}).get("notes", [])
+    return notes
 
 
 def foretold_text(foretold: Forecast | None) -> str:

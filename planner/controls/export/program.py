@@ -21,6 +21,7 @@ from planner.base.errors import InputError
 from planner.controls.export.candidates import Candidate, Candidates, best_first, candidates
 from planner.controls.export.controls import CONTROLS, LINUXCNC
 from planner.controls.export.output import FIRST_RUN, assumptions
+from planner.motion.trajectory import require_rest
 from planner.planning.job.plan import Plan
 
 NO_JERK = "has no limit of the jerk, which the plan keeps: so it can be faster than the plan"
@@ -48,7 +49,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     tolerance : of the path [mm], which plan and chords share
 
     Where the plan leaves no room for chords the program's own path is written, and a note says so. Raises
-    InputError if the motion leaves the program, for a program with the tool centre point on, and with its
+    InputError if the motion leaves the program or is not from rest to rest, for a program with the tool centre point on, and with its
     line for what the control has no words for.
     """
     if plan.joints is not None:
@@ -57,6 +58,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
             "planned feeds, and --for linuxcnc-stream and --for pvt play the setpoints of its joints",
             source=plan.program.source,
         )
+    require_rest(plan.trajectory is None or plan.trajectory.from_rest_to_rest)
     job = Candidates(plan, CONTROLS[control], tolerance)
     found = candidates(job)
     chosen, data, notes = _first_written(job, best_first(job, found))

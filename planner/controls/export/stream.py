@@ -21,7 +21,7 @@ from planner.base.errors import InputError
 from planner.base.sizes import SIZES
 from planner.base.units import MM_PER_INCH
 from planner.machine import ROTARY_AXES
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory, require_rest
 
 DEPTH = 4000  # rows that wait in the FIFO: four seconds at 1 ms, while the disk may be busy
 _NANOSECONDS = 1e9  # in a second: HAL gives a thread's period in them
@@ -31,7 +31,9 @@ UNITS = {"mm": 1.0, "inch": MM_PER_INCH}
 
 
 def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> None:
-    """Write the three files into an existing directory. Raises InputError for a unit but mm and inch."""
+    """Write the three files into an existing directory. Raises InputError for another unit than mm or inch, and for a motion
+    that is not from rest to rest."""
+    require_rest(trajectory.from_rest_to_rest)
     scale = scale_of(trajectory, unit)
     with (directory / "setpoints.txt").open("w", encoding="ascii") as file:
         file.write(f"# {' '.join(trajectory.axes)} [{unit}, deg], one row every {trajectory.dt:g} s\n")

@@ -27,7 +27,7 @@ from planner.base.errors import InputError
 from planner.base.units import MICROMETRE, MILLISECOND, RAD_PER_DEG
 from planner.controls.export.stream import scale_of
 from planner.machine import ROTARY_AXES
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory, require_rest
 from planner.nc.program import Kind, Program
 
 WITHIN = 1e-3  # [mm]: a thousandth of a millimetre, below what contour tolerances are
@@ -58,8 +58,10 @@ def write_table(directory: Path, trajectory: Trajectory, table: Table) -> tuple[
     largest distance found [mm].
 
     Raises InputError for another unit than mm or inch, a distance that is not above 0 or that the cycle exceeds, a cycle
-    that is no whole number of interpolation periods, and as many names of joints as there are no axes.
+    that is no whole number of interpolation periods, and as many names of joints as there are no axes;
+    for a motion that is not from rest to rest too.
     """
+    require_rest(trajectory.from_rest_to_rest)
     scale = scale_of(trajectory, table.unit)
     within = WITHIN if table.within is None else table.within
     if not within > 0:

@@ -98,8 +98,9 @@ def fitted(measured: Mapping[str, tuple[Program, float]], machine: Machine, cont
 
     names, start = _sought(measured, machine, control)
     if len(measured) < len(names):
-        said = f"{len(measured)} times for {len(names)} settings ({', '.join(names)}): run all of the test programs"
-        raise InputError(said)
+        raise InputError(
+            f"{len(measured)} times for {len(names)} settings ({', '.join(names)}): run all of the test programs (--write makes them)"
+        )
     seconds = np.array([took for _, took in measured.values()])
 
     def times(log: FloatArray) -> FloatArray:

@@ -6,11 +6,12 @@ Those of the reader (`Program.notes`) come first, then machine and tolerance, th
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
+from planner.base.units import MM_PER_INCH, RAD_PER_DEG, SECONDS_PER_MINUTE
 from planner.geometry.curves import CHORD_SHARE
 from planner.geometry.toolpath import Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.nc.extents import travel_faults
+from planner.nc.points import in_inches, own_text
 from planner.nc.program import FEED_MOVES, Kind, Program
 from planner.planning.job.beside import TOOL_CHANGE, codes_of
 
@@ -41,6 +42,7 @@ def job_notes(program: Program, machine: Machine, toolpath: Toolpath) -> list[st
         *_travel_notes(program, machine),
         *cutting_notes(program, machine),
         *unit_notes(machine),
+        *inch_notes(program, machine),
         *_feed_notes(program, machine),
         *_spline_notes(program, toolpath),
         *_extruder_notes(toolpath),
@@ -146,6 +148,19 @@ def unit_notes(machine: Machine) -> list[str]:
         unit = "ms" if machine.dt > PERIOD_MAX else "another unit"
         notes.append(f"the interpolation period dt is {machine.dt:g} s: is the number in {unit}?")
     return notes
+
+
+def inch_notes(program: Program, machine: Machine) -> list[str]:
+    """A sentence where a program in inches asks for more than any axis can: it may be one in mm."""
+    fed = np.where(np.isfinite(program.feed), program.feed, 0.0)
+    most = max((machine.axes[axis].velocity for axis in LINEAR_AXES if axis in machine.axes), default=np.inf)
+    if fed.max(initial=0.0) <= most or not in_inches(program, own_text(program) or b""):
+        return []
+    k, unit = int(fed.argmax()), MM_PER_INCH / SECONDS_PER_MINUTE
+    return [
+        f"line {program.line[k]}: F{fed[k] / unit:.5g} in inches (G20) is more than any axis can, {most / unit:.5g} in/min: is the "
+        "program in mm (G21)?"
+    ]
 
 
 def short_block_notes(toolpath: Toolpath) -> list[str]:

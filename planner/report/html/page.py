@@ -1,12 +1,7 @@
-"""The file `report.html`: one page with everything in it, plotly's script too, so that it opens without a
-network.
+"""The file `report.html`: one page with everything in it, plotly's script too, so that it opens without a network.
 
-Columns of numbers are compressed (gzip) and written as base64; the page unpacks them with the browser's own
-DecompressionStream. Texts of the program and of names are data as well, and the page shows them as text, so
-that nothing in a program is ever run.
-
-The first picture needs none of that: it is in the page as SVG, and the header is filled before plotly's
-script, some five megabytes, is run and the columns are unpacked.
+Columns of numbers are compressed and in base64; the browser's DecompressionStream unpacks them. Texts of the program are
+data that is shown and never run. The first picture is SVG, seen before plotly's five megabytes are run.
 """
 
 from __future__ import annotations
@@ -39,7 +34,6 @@ from planner.report.figure import (
 from planner.report.html.data import lines_of, programmed_path, samples_of
 from planner.report.html.parts import page_of
 from planner.report.plotly_figure import PROGRAMMED, colourings, fitted_scene, panel_figure
-from planner.report.rows import plan_rows
 from planner.report.summary import json_ready, summary
 from planner.report.units import Units, axis_titles, units_of
 
@@ -68,7 +62,7 @@ def report_page(
         raise ValueError("report_page: the plan has no trajectory; see plan.sentence")
     columns, about = _columns(plan, units_of(plan.program, units))
     columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
-    about["summary"] = told = {"told": plan_rows(plan)} | (said or summary(plan))
+    about["summary"] = told = said or summary(plan)
     names = list(dict.fromkeys([*about["limits"], *(told.get("held_by") or ())]))
     about["colours"] = dict(zip(names, limit_colours(names), strict=True))
     return page_of("report", "planned", told["program"], about, columns, PICTURE=path_picture(plan, PICTURE))

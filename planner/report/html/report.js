@@ -12,7 +12,7 @@
     element("verdict").textContent = passed ? "passed" : "failed";
     element("verdict").className = passed ? "passed" : "failed";
     // Words and figures are those of the terminal: summary.told. The header has some of them, the table "In words" all.
-    const told = summary.told || [], header = ["cycle time", "stopping at every block", "beside the motion", "total", "contour error", "corners missed by"];
+    const told = summary.told || [], header = ["cycle time", "saved", "beside the motion", "total", "contour error", "corners missed by"];
     for (const [name, value] of told) {
       const line = make("tr");
       line.append(make("th", name), make("td", value));
@@ -36,7 +36,9 @@
       element("judged").append(row);
     }
     for (const text of summary.assumptions || []) element("assumed").append(make("li", `assumed: ${text}`));
-    for (const note of summary.notes.length ? summary.notes : ["nothing was assumed or given up"]) element("notes").append(make("li", note));
+    const others = summary.notes.filter((note) => !(summary.assumptions || []).includes(note));
+    for (const note of others.length || element("assumed").children.length ? others : ["nothing was assumed or given up"]) element("notes").append(make("li", note));
+    element("notes-box").hidden = !element("notes").children.length;
     const prices = summary.prices, saved = prices && prices.saved_s ? Object.entries(prices.saved_s) : [];
     if (saved.length) {
       const head = make("tr");
@@ -45,8 +47,9 @@
       for (const [name, seconds] of saved.sort((a, b) => b[1] - a[1]).slice(0, 8)) {
         if (!(seconds >= 5e-4 * summary.cycle_time_s)) continue; // as in the terminal
         const row = make("tr"), more = name === "tolerance" ? `${1000 * prices.more_tolerance_mm} µm` : `${100 * prices.more_limit} %`;
-        const hint = (prices.hints || []).includes(name) ? "about " : "";
-        row.append(make("td", `${name}, ${more}`), make("td", hint + digits(seconds, 3)));
+        const [least, most] = (prices.hints || []).includes(name) ? prices.saved_range_s[name] : [seconds, seconds];
+        const text = least === most ? digits(seconds, 3) : `${digits(name === "tolerance" ? least : Math.max(least, 0), 2)} to ${digits(most, 2)}`;
+        row.append(make("td", `${name}, ${more}`), make("td", text));
         element("prices").append(row);
       }
     }

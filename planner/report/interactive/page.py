@@ -119,7 +119,7 @@ def plan_frame(plan: Plan) -> pandas.DataFrame:
 SIZE = 320.0  # of the picture, its longer side [px]
 # Rows of the table of a plan that are shown, besides what more of the limits saves.
 SHOWN = (
-    *("cycle time", "stopping at every block", "beside the motion", "total"),
+    *("cycle time", "saved", "beside the motion", "total"),
     *("contour error", "corners missed by", VERDICT, ""),
 )
 NOTES, HELD = 4, 5  # notes, and limits with the largest shares of the time, that are shown

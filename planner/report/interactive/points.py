@@ -163,7 +163,10 @@ def stretched(plan: Plan, duration: float) -> Plan:
 def _points(points: ArrayLike, axes: str) -> tuple[FloatArray, str]:
     """(n, A) the points, and the letters of their columns. Raises InputError unless they are finite numbers, n > 1, of
     axes that there are."""
-    given = _numbers(points, "points: not an array of numbers; give (n, 2) or (n, 3), one row for each point")
+    given = _numbers(
+        points,
+        "points: not an array of numbers; give (n, A), a row for each point, and axes='xya' to name columns",
+    )
     letters = axes.lower() or "".join(AXES[: given.shape[-1] if given.ndim else 0])
     if not known_axes(letters):
         raise InputError(f"axes '{axes}': give each letter once, of x y z a b c u v w")

@@ -13,7 +13,8 @@ from planner.machine import Times, load_machine, machine_from_dict
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.planning.job.beside import beside_motion
-from planner.report.rows import beside_rows, beside_summary
+from planner.report.rows import beside_rows
+from planner.report.summary import beside_summary
 
 MILL = load_machine("mill")
 

@@ -6,8 +6,8 @@ import pytest
 
 from planner.geometry.build import toolpath_from_program
 from planner.machine import Machine, builtin_machines, load_machine
-from planner.nc.reader import parse_program
-from planner.planning.job.notes import short_block_notes, unit_notes
+from planner.nc.reader import parse_program, read_program
+from planner.planning.job.notes import inch_notes, short_block_notes, unit_notes
 
 MILL = load_machine("mill")
 
@@ -54,3 +54,14 @@ def test_blocks_shorter_than_the_tolerance_are_noted() -> None:
     (said,) = short(coarse, fine)
     assert said.startswith("half of the blocks are not longer than 0.1 mm, and the tolerance is 0.5 mm")
     assert short(coarse, "G0 X0.1") == []
+
+
+def test_feeds_in_inches_that_no_axis_can_run_are_asked_about() -> None:
+    """F1200 in a program of mm is 508 mm/s once it says G20; mill's axes run 500."""
+    (said,) = inch_notes(read_program(text="G20\nG1 X3 F1200", machine=MILL), MILL)
+    assert (
+        said
+        == "line 2: F1200 in inches (G20) is more than any axis can, 1181.1 in/min: is the program in mm (G21)?"
+    )
+    for fits in ("G20\nG1 X3 F1100", "G21\nG1 X3 F60000", "G1 X3 F60000"):
+        assert inch_notes(read_program(text=fits, machine=MILL), MILL) == []

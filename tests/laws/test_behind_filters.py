@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from quick import slow_but
 from scipy.spatial import cKDTree
 
 from benchmarks.jobs import problems
@@ -33,8 +34,6 @@ CORNER = problems.polyline([[0, 0], [5, 0], [5, 5]], source="corner")
 LENGTHS = [(0.01, 0.004), (0.02, 0.013), (0.05, 0.03)]
 BEZIER = {"optimal": "bezier", "second-order": "bezier"}  # on splines below
 METHODS = ["stop", "kinematic", "bezier", "fir", "fir-spline", "second-order", "optimal"]
-LONG = {"fir", "fir-spline"}  # seconds for one plan
-CASES = [(method, one) for method in METHODS for one in LENGTHS if method not in LONG or one == LENGTHS[1]]
 
 
 def machine(lengths, **more):
@@ -88,7 +87,8 @@ def assert_kept(made, lengths):
 
 @pytest.mark.shows("filters", "sampled: every method within the tolerance behind them")
 @pytest.mark.slow
-@pytest.mark.parametrize(("method", "lengths"), CASES, ids=str)
+@pytest.mark.parametrize("lengths", slow_but([(0.02, 0.013)], LENGTHS), ids=str)
+@pytest.mark.parametrize("method", slow_but(("stop", "kinematic", "fir", "second-order"), METHODS))
 def test_behind_the_filters_nothing_leaves_the_tolerance(method, lengths):
     assert_kept(plan(JOB, machine(lengths), method=method, corner=BEZIER.get(method)), lengths)
 

@@ -14,6 +14,7 @@ in less time; dwells are cut (shortened.py).
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib
 import itertools
@@ -131,6 +132,7 @@ class Job:
         }
 
 
+@functools.cache
 def fingerprint() -> str:
     """A word for what seeds draw: another one where the first of them draw other jobs.
 

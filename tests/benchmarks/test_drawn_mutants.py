@@ -83,7 +83,7 @@ import sys
 from pathlib import Path
 from benchmarks.mutants import trial
 from benchmarks.mutants.draw import Mutant
-trial.CPU = 4
+trial.CPU = 2
 mutant = Mutant(area="judge", file="summed.py", line=7, column=12, old=" + ", new=sys.argv[2])
 found = trial.outcome(mutant, Path(sys.argv[1]), ["tests/test_summed.py"], {"test_summed.py::test_broken"})
 print(*map(repr, (found[0].replace(" ", "_"), found[1])))

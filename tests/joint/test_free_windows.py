@@ -25,14 +25,14 @@ from planner.planning.methods.tube import TubeMethod
 
 CORNER, ARCS = PROGRAMS["corner"], PROGRAMS["arcs"]
 # Share of the time by which ipopt may end elsewhere, begun where the own solver ended [-]; 1.6e-4 was seen (pushed: ipopt is slower).
-SAME = {"corner": 2e-4, "arcs": 2e-4, "pentagon": 2e-4, "pushed": 2e-4, "turned": 2e-4}
+SAME = {"corner": 2e-4, "arcs": 2e-4, "pushed": 2e-4, "turned": 2e-4}
 MISSED = own.MISSED
 
 
 # --- its pieces ----------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["corner", "arcs", "curves", "narrow", "pushed", "turned", "own", "powered"])
+@pytest.mark.parametrize("name", ["corner", "arcs", "curves", "narrow", "pushed", "own", "powered"])
 def test_slopes_are_the_differences_of_the_rows(name):
     """Of all rows whose vector is what moves; the radii of the feed are kept, and so are the tangents of order and arcs."""
     run, guess = begun(name)
@@ -62,7 +62,7 @@ def test_slopes_are_the_differences_of_the_rows(name):
     np.testing.assert_allclose(slope[exact], ((after - before) / 2)[exact], rtol=2e-3, atol=2e-9)
 
 
-@pytest.mark.parametrize("name", ["corner", "arcs", "curves", "narrow", "pushed", "turned"])
+@pytest.mark.parametrize("name", ["corner", "arcs", "curves", "narrow", "pushed"])
 def test_the_model_is_that_of_all_slopes_and_of_what_is_flat(name):
     """Of rows that all but touch, z/s grad g grad g', by the slopes in a random step; of rows far from that, z d2g of the rows at
     nodes, by the change of their slopes along a step of the node alone."""
@@ -235,7 +235,7 @@ def test_places_on_a_line_go_never_back_and_the_farthest_is_moved_by_as_little_a
 
 @pytest.mark.shows("tube", "compared: ipopt on the same problem finds nothing more")
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["corner", "arcs", "pentagon", "pushed", "turned"])
+@pytest.mark.parametrize("name", ["corner", "arcs", "pushed", "turned"])
 def test_ipopt_finds_nothing_more_where_it_ends(name):
     run, guess = begun(name)
     mine = tube_solvers.Precise().solve(run, guess)

@@ -24,7 +24,7 @@ from planner.joint.window_solver import Asked, kind_of, solve_windows
 from planner.machine.user_limit import PathLimit
 
 pytestmark = pytest.mark.usefixtures("threads_as_before")
-NAMES = ("corner", "arcs", "curves", "narrow", "pentagon", "own", "powered", "turned")
+NAMES = ("corner", "arcs", "curves", "narrow", "pentagon", "own", "powered")
 
 
 class Fence(PathLimit):
@@ -173,7 +173,7 @@ def small_windows(monkeypatch) -> None:
 
 @cache
 def jobs():
-    """Searches of runs of lines, arcs, laws of the user and turning axes, and what each finds by itself, one after
+    """Searches of runs of lines, arcs and laws of the user, and what each finds by itself, one after
     the other."""
     solvers = [TubeOwn(gap=1e-3), TubeOwn(gap=1e-3, stays=False)]
     runs = [*map(begun, NAMES), begun_on(PROGRAMS["pentagon"], machine=MACHINE.with_own([Fence()]))]
@@ -264,7 +264,7 @@ def test_what_is_left_of_the_start_is_searched_once_more_from_inside_of_what_was
 def test_lanes_find_what_single_numbers_find():
     """The kernel on lanes against itself on single numbers, in any order and beside any others."""
     asked = []
-    for name in ("corner", "pentagon", "pushed", "turned", "own", "powered", "arcs", "curves", "narrow"):
+    for name in ("corner", "pentagon", "pushed", "own", "powered", "arcs", "curves", "narrow"):
         run, guess = begun(name)
         missed = own.MISSED
         window = window_of(run, guess, 0, len(guess), missed, which=np.arange(0))

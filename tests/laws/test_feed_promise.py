@@ -31,7 +31,7 @@ def test_f_is_kept_along_a_line(method):
 
 
 @pytest.mark.shows("feed", "sampled: by code of the tests, every method, F that changes at every block")
-@pytest.mark.parametrize("seed", slow_but([2, 3], range(5)))
+@pytest.mark.parametrize("seed", slow_but([2, 3], range(4)))
 def test_f_is_kept_round_corners_and_on_arcs(seed):
     """Blocks that lie inside the tolerance, reversals, arcs."""
     for method in ("optimal", "kinematic"):

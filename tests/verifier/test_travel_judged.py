@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +20,16 @@ from tests.commands.command_line import run
 from tests.nc.test_travel import reaching
 
 JOB = "G21 G90 G64 P0.02 F3000\nG0 X10 Y5\nG1 X40\nG3 X40 Y25 J10\nG1 X10 Y20\nY5\n"
-MADE = planner.plan(planner.read_program(text=JOB), method="kinematic")
 
 
-def on(machine: Machine, made: Plan = MADE, **how: tuple[str, ...]) -> Verdict:
+@cache
+def job() -> Plan:
+    """By the first test: at import every worker would compile what it takes."""
+    return planner.plan(planner.read_program(text=JOB), method="kinematic")
+
+
+def on(machine: Machine, made: Plan | None = None, **how: tuple[str, ...]) -> Verdict:
+    made = made or job()
     motion = made.joints if made.joints is not None else made.trajectory
     assert motion is not None
     return judged(motion, Judged(program=made.program, toolpath=made.toolpath, machine=machine, **how))
@@ -33,8 +40,9 @@ def on(machine: Machine, made: Plan = MADE, **how: tuple[str, ...]) -> Verdict:
 @given(st.floats(11.0, 60.0), st.sampled_from("xy"), st.booleans())
 def test_a_motion_beyond_the_travel_fails_by_how_far_it_goes(end: float, axis: str, other: bool) -> None:
     """Either end of the travel, against the furthest sample; the tolerance is allowed."""
-    assert MADE.trajectory is not None
-    place = MADE.trajectory.position[:, "xy".index(axis)]
+    motion = job().trajectory
+    assert motion is not None
+    place = motion.position[:, "xy".index(axis)]
     travel = (-end, 60.0) if other else (-60.0, end)
     beyond = 0.0 if other else place.max() - end
     verdict = on(reaching({}, **{axis: travel}))
@@ -46,9 +54,9 @@ def test_a_motion_beyond_the_travel_fails_by_how_far_it_goes(end: float, axis: s
         assert said is not None
         assert float(said[1]) == pytest.approx(place.max(), rel=1e-6)
         assert float(said[2]) == pytest.approx(beyond, rel=1e-3)
-        at = int(np.argmin(np.abs(MADE.trajectory.t - fault.time)))
+        at = int(np.argmin(np.abs(motion.t - fault.time)))
         assert place[at] == pytest.approx(place.max(), abs=1e-9)
-        assert fault.line in {MADE.trajectory.line[at], MADE.trajectory.line[at] + 1}
+        assert fault.line in {motion.line[at], motion.line[at] + 1}
 
 
 def test_what_is_not_judged() -> None:

@@ -54,6 +54,8 @@ SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e11
 # By how much the largest gap of the kinematics may grow over what a step's linear model says, in mean steps, and as a
 # share of what it was [-]: a step that bends them by more is shortened.
 BENT, BENT_OF = 0.05, 0.3
+# The same of rows, as a share of their limits [-].
+BENT_ROWS = 0.1
 # By how much prox grows with every step that is shortened once the complementarity is reached, and how far [-]: where steps
 # are too long for ever, windows run round and round.
 WARY, WARIEST = 2.0, 10.0
@@ -260,6 +262,14 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
             along = along - back
             prox = where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + zero)), prox)
             gap_most, off = gaps(sizes, group, x, u, gap)
+        allowed = larger(BENT_ROWS + zero, broken)
+        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)
+        if anywhere(active * broken > active * allowed):
+            back = where(active * broken > active * allowed, along * (1.0 - root(allowed / broken)), zero)
+            _go(sizes, x, u, factor, -back)
+            along = along - back
+            prox = where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + zero)), prox)
+            gap_most, off = gaps(sizes, group, x, u, gap)
+            products, broken, owed = put_rows(sizes, group, held, x, u, rows, -back, zero, looking, scratch)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]
-        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)

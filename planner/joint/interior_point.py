@@ -157,6 +157,15 @@ def _go(sizes, x, u, factor, along):
             u[i, k] += along * factor.du[i, k]
 
 
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _copy_places(sizes, of, to):
+    """Where the search on arcs begins, from one memory to another (N, 6)."""
+    if sizes.bends > 0:
+        for i in range(sizes.steps):
+            for c in range(3 * SETS):
+                to[i, c] = of[i, c]
+
+
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
 def solve_group(sizes, numbers, held, motion, tuning, work, found):
     """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 6, W),
@@ -188,6 +197,7 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
     lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
     for k in range(S):
         lambda_end[k] = zero
+    place = wide2(work.place, width, PLACES)
     looking = room.y, wide2(work.nearest, width, THREE), wide1(work.top, width)
     count = put_present(sizes, group, rows)
     put_rows(sizes, group, held, x, u, rows, zero, zero, looking, scratch)
@@ -263,6 +273,7 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
             prox = where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + zero)), prox)
             gap_most, off = gaps(sizes, group, x, u, gap)
         allowed = larger(BENT_ROWS + zero, broken)
+        _copy_places(sizes, rows.place, place)
         products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)
         if anywhere(active * broken > active * allowed):
             back = where(active * broken > active * allowed, along * (1.0 - root(allowed / broken)), zero)
@@ -270,6 +281,7 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
             along = along - back
             prox = where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + zero)), prox)
             gap_most, off = gaps(sizes, group, x, u, gap)
+            _copy_places(sizes, place, rows.place)  # as in a lane that is not shortened
             products, broken, owed = put_rows(sizes, group, held, x, u, rows, -back, zero, looking, scratch)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]

@@ -9,7 +9,7 @@ the last sum is as it was guessed, and d the distance of the node from its leg (
 rows are linearised anew in every iteration. The curvature of the rows counts, that of the kinematics does
 not: h times velocity, acceleration and jerk is indefinite, and with it a step would not go down. Instead a
 change of h costs `prox` in every iteration, so that steps stay where the linear model holds, and no step goes
-farther than that holds for the kinematics, but for `BENT`: along a phase of constant acceleration nodes slide for
+farther than that holds for kinematics and rows, but for `BENT` and `BENT_ROWS`: along a phase of constant acceleration nodes slide for
 nothing else. A change of the velocity costs too where the normal acceleration is limited (normal_rows.py).
 
 A window is searched on single numbers, or several side by side, one in each lane (base/lanes.py): what is found in one does
@@ -52,8 +52,8 @@ OFF = 2e-9
 # rho (recursion.py) grows by so many times, up to a value at which the recursion still has five digits [-].
 SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e11
 # By how much the largest gap of the kinematics may grow over what a step's linear model says, in mean steps, and as a
-# share of what it was [-]: a step that bends them by more is shortened.
-BENT, BENT_OF = 0.05, 0.3
+# share of what it was [-]: a step that bends them by more is shortened. Less where the complementarity is reached.
+BENT, BENT_OF, BENT_CLOSE = 0.05, 0.3, 0.005
 # The same of rows, as a share of their limits [-].
 BENT_ROWS = 0.1
 # By how much prox grows with every step that is shortened once the complementarity is reached, and how far [-]: where steps
@@ -262,7 +262,8 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
             sizes, group, x, u, gap, rows, False, aim, second, factor, room, change
         )
         along, dual = where(active > 0.0, along, zero), where(active > 0.0, dual, zero)
-        linear, allowed = (1.0 - along) * gap_most, larger(BENT + zero, BENT_OF * gap_most)
+        linear, allowed = (1.0 - along) * gap_most, where(close > 0.0, BENT_CLOSE + zero, BENT + zero)
+        allowed = larger(allowed, BENT_OF * gap_most)
         _go(sizes, x, u, factor, along)
         gap_most, off = gaps(sizes, group, x, u, gap)
         bent = larger(gap_most - linear, allowed)

@@ -81,7 +81,7 @@ def _plain(fault: Any, options: list[str]) -> None:
     """Change the message of a usage fault, in place."""
     wrong = getattr(fault, "option_name", None)
     if type(fault).__name__ == "NoSuchOption":
-        near = difflib.get_close_matches(wrong, options, n=1, cutoff=NEAR)
+        near = difflib.get_close_matches(str(wrong), options, n=1, cutoff=NEAR)
         near = ["--vary NAME=RANGE"] if wrong == "--set" and "--vary" in options else near
         fault.message = f"no option {wrong}" + (f"; did you mean {near[0]}?" if near else "")
         fault.possibilities = None

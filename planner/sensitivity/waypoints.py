@@ -36,7 +36,7 @@ class Way(NamedTuple):
     limit: FloatArray
 
     def of(self, nodes: Array | slice, legs: Array | slice) -> "Way":
-        """Some of the waypoints, and some of the legs."""
+        """Some of the waypoints, `nodes` (k,) of them, and of the legs, `legs` (l,)."""
         cut = {name: getattr(self, name)[nodes] for name in NODES}
         return self._replace(**cut, **{name: getattr(self, name)[legs] for name in LEGS})
 

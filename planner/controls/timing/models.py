@@ -98,8 +98,8 @@ def as_set(control: Control, machine: Machine) -> Control:
 
 def moving(points: FloatArray, feed: FloatArray, stop: Array) -> tuple[FloatArray, FloatArray, Array, Array]:
     """Vertices (k+1, A), feeds (k,) and stops (k+1,) without the moves that move nothing, and which moves are left (n,): a
-    stop between these belongs to the vertex before. Of the arguments of `predicted_times`. Raises InputError
-    where nothing moves."""
+    stop between these belongs to the vertex before. points (n+1, A), feed (n,) and stop (n+1,) are those of `predicted_times`.
+    Raises InputError where nothing moves."""
     moves = (np.diff(points, axis=0) != 0.0).any(axis=1)
     if not moves.any():
         raise InputError("the path moves nowhere")
@@ -243,7 +243,7 @@ def stoppable(gain: FloatArray, blocks: int, seen: Array) -> FloatArray:
 def move_times(
     length: FloatArray, accel: FloatArray, x0: FloatArray, peak: FloatArray, x1: FloatArray
 ) -> FloatArray:
-    """(n,) times of blocks from x0 over a peak to x1, squares of speeds, with constant accel, (n,) all."""
+    """(n,) times of blocks of some length from x0 over a peak to x1, squares of speeds, with constant accel, (n,) all."""
     v0, v, v1 = np.sqrt(x0), np.sqrt(np.maximum(peak, np.maximum(x0, x1))), np.sqrt(x1)
     even = np.maximum(length - (2.0 * v * v - x0 - x1) / (2.0 * accel), 0.0)  # way without acceleration
     times: FloatArray = (2.0 * v - v0 - v1) / accel + even / np.maximum(v, STANDING)

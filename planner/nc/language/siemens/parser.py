@@ -86,6 +86,7 @@ class SiemensParser(BlockWords):
                 self.body += self.cycle
 
     def take_line(self, line: SourceLine) -> None:
+        """Put the statements of a line where they belong."""
         # without the comment; a semicolon in a text is none
         text = re.sub(r'("[^"]*")|;.*', lambda found: found.group(1) or "", line.text.rstrip("\r\n\x1a"))
         at = 0

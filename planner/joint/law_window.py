@@ -33,6 +33,7 @@ INSIDE = 1e-3
 JUMP, HALVINGS = 0.3, 30
 THERE = 0.01  # of a step: a jump so near to a node is at it [-]
 FAR = 1e6  # of a mean step's speed, acceleration and so on: instead of no bound [-]
+TOLD_LEAST = 0.3  # share of the way by which what is told of chords changes at least [-]
 SMALLEST = np.finfo(np.float64).tiny
 
 
@@ -47,12 +48,25 @@ class Window(CutMotion):
     """
 
     def __init__(self, cut: CutMotion | Guess, lo: int, hi: int, rest: FloatArray | None = None):
-        self.rest = rest
+        self.rest, self._off, self._share = rest, np.zeros(0), 1.0
         begin, end = max(lo - 1, 0), min(hi + 1, len(cut))
         self.leg, self.h = cut.leg[begin:end], cut.h[begin:end].copy()
         self.state, self.place = cut.state[begin : end + 1].copy(), cut.place[begin:end].copy()
         self.lo, self.hi = lo - begin, hi - begin
         self.h[: self.lo] = self.h[self.hi :] = 0.0
+
+    def tell(self, rest: FloatArray) -> None:
+        """Take in what chords of the motion found are off, `rest` of the class text: by a share of the way there from what was told
+        before, as what is found with it may overshoot again and again (Aitken 1926; Irons and Tuck 1969)."""
+        if self.rest is None:
+            self.rest = rest
+            return
+        off = rest - self.rest
+        if len(self._off):
+            change = off - self._off
+            share = -self._share * (self._off * change).sum() / (change**2).sum()
+            self._share = min(max(float(share), TOLD_LEAST), 1.0)
+        self._off, self.rest = off, self.rest + self._share * off
 
     def seen(self, step: Array, t: FloatArray) -> tuple[Where, FloatArray]:
         """Where steps `step` (n,) are at the times t (n,) after their beginning, and their motion (n, 4, A)."""

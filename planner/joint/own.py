@@ -300,7 +300,7 @@ class _Search:
             if of_chords or (run.laws.moved and tube.max() <= 1.0):
                 begun.put(h, found, along)
             if of_chords:
-                begun.rest = self._rest(leg, h, found, jerk)
+                begun.tell(self._rest(leg, h, found, jerk))
             # what passes a short leg at its distance is nearest to one of its ends, and too far in its middle:
             # no step of such a leg alone is the cause
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)

@@ -57,7 +57,8 @@ def test_a_segment_of_the_figure_8_is_as_long_as_its_paper_prints() -> None:
 
 
 def test_the_sinusoid_is_its_formula() -> None:
-    at = published.sinusoid().at(np.linspace(*published.sinusoid().breaks[[0, -1]], 10_007))
+    curve = published.sinusoid()
+    at = curve.at(np.linspace(*curve.knots[[0, -1]], 10_007))
     assert np.abs(at[:, 1] - 50.0 * (1.0 - np.cos(0.02 * np.pi * at[:, 0]))).max() < 1e-6
 
 

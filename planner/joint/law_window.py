@@ -56,8 +56,8 @@ class Window(CutMotion):
         self.h[: self.lo] = self.h[self.hi :] = 0.0
 
     def tell(self, rest: FloatArray) -> None:
-        """Take in what chords of the motion found are off, `rest` (N+1, A + 1) of the class text: by a share of the way there from what was told
-        before, as what is found with it may overshoot again and again (Aitken 1926; Irons and Tuck 1969)."""
+        """Take in what chords of the motion found are off, `rest` (N+1, A + 1) of the class text: by a share of the way there
+        from what was told before, as what is found with it may overshoot again and again (Aitken 1926; Irons and Tuck 1969)."""
         if self.rest is None:
             self.rest = rest
             return

@@ -52,10 +52,9 @@ OFF = 2e-9
 # rho (recursion.py) grows by so many times, up to a value at which the recursion still has five digits [-].
 SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e11
 # By how much the largest gap of the kinematics may grow over what a step's linear model says, in mean steps, and as a
-# share of what it was [-]: a step that bends them by more is shortened. Less where the complementarity is reached.
-BENT, BENT_OF, BENT_CLOSE = 0.05, 0.3, 0.005
-# The same of rows, as a share of their limits [-].
-BENT_ROWS = 0.1
+# share of what it was [-]: a step that bends them by more is shortened. Where the complementarity is reached it is less. By
+# how much the largest row may be broken [-], if it was not before. Without these windows creep (tests/joint/test_shortened_steps.py).
+BENT, BENT_OF, BENT_CLOSE, BENT_ROWS = 0.05, 0.3, 0.005, 0.1
 # By how much prox grows with every step that is shortened once the complementarity is reached, and how far [-]: where steps
 # are too long for ever, windows run round and round.
 WARY, WARIEST = 2.0, 10.0
@@ -155,6 +154,15 @@ def _go(sizes, x, u, factor, along):
             x[i, k] += along * factor.dx[i, k]
         for k in range(len(sizes.control)):
             u[i, k] += along * factor.du[i, k]
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _back(sizes, x, u, factor, along, allowed, bent, prox, close):
+    """Take back so much of a step that what it has bent, which grows with its square, is what is `allowed`. Returns how much,
+    and prox, which grows with it where `close`."""
+    back = along * (1.0 - root(allowed / larger(bent, allowed)))
+    _go(sizes, x, u, factor, -back)
+    return back, where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + 0.0 * prox)), prox)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -266,21 +274,16 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
         allowed = larger(allowed, BENT_OF * gap_most)
         _go(sizes, x, u, factor, along)
         gap_most, off = gaps(sizes, group, x, u, gap)
-        bent = larger(gap_most - linear, allowed)
-        if anywhere(active * bent > active * allowed):
-            back = along * (1.0 - root(allowed / bent))
-            _go(sizes, x, u, factor, -back)
+        if anywhere(active * (gap_most - linear) > active * allowed):
+            back, prox = _back(sizes, x, u, factor, along, allowed, gap_most - linear, prox, close)
             along = along - back
-            prox = where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + zero)), prox)
             gap_most, off = gaps(sizes, group, x, u, gap)
         allowed = larger(BENT_ROWS + zero, broken)
         _copy_places(sizes, rows.place, place)
         products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)
         if anywhere(active * broken > active * allowed):
-            back = where(active * broken > active * allowed, along * (1.0 - root(allowed / broken)), zero)
-            _go(sizes, x, u, factor, -back)
+            back, prox = _back(sizes, x, u, factor, along, allowed, broken, prox, close)
             along = along - back
-            prox = where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + zero)), prox)
             gap_most, off = gaps(sizes, group, x, u, gap)
             _copy_places(sizes, place, rows.place)  # as in a lane that is not shortened
             products, broken, owed = put_rows(sizes, group, held, x, u, rows, -back, zero, looking, scratch)

@@ -62,8 +62,7 @@ class Window(CutMotion):
             self.rest = rest
             return
         off = rest - self.rest
-        if len(self._off):
-            change = off - self._off
+        if len(self._off) and (change := off - self._off).any():
             share = -self._share * (self._off * change).sum() / (change**2).sum()
             self._share = min(max(float(share), TOLD_LEAST), 1.0)
         self._off, self.rest = off, self.rest + self._share * off

@@ -9,7 +9,7 @@ the last sum is as it was guessed, and d the distance of the node from its leg (
 rows are linearised anew in every iteration. The curvature of the rows counts, that of the kinematics does
 not: h times velocity, acceleration and jerk is indefinite, and with it a step would not go down. Instead a
 change of h costs `prox` in every iteration, so that steps stay where the linear model holds, and no step goes
-farther than that holds for kinematics and rows, but for `BENT` and `BENT_ROWS`: along a phase of constant acceleration nodes slide for
+farther than that holds for the kinematics, but for `BENT`: along a phase of constant acceleration nodes slide for
 nothing else. A change of the velocity costs too where the normal acceleration is limited (normal_rows.py).
 
 A window is searched on single numbers, or several side by side, one in each lane (base/lanes.py): what is found in one does
@@ -52,9 +52,9 @@ OFF = 2e-9
 # rho (recursion.py) grows by so many times, up to a value at which the recursion still has five digits [-].
 SLOWLY, SLOW_FOR, STIFFER, STIFFEST = 0.5, 3, 10.0, 1e11
 # By how much the largest gap of the kinematics may grow over what a step's linear model says, in mean steps, and as a
-# share of what it was [-]: a step that bends them by more is shortened. Where the complementarity is reached it is less. By
-# how much the largest row may be broken [-], if it was not before. Without these windows creep (tests/joint/test_shortened_steps.py).
-BENT, BENT_OF, BENT_CLOSE, BENT_ROWS = 0.05, 0.3, 0.005, 0.1
+# share of what it was [-]: a step that bends them by more is shortened. Where the complementarity is reached it is less, or nodes slide
+# on among equal optima (tests/joint/test_shortened_steps.py).
+BENT, BENT_OF, BENT_CLOSE = 0.05, 0.3, 0.005
 # By how much prox grows with every step that is shortened once the complementarity is reached, and how far [-]: where steps
 # are too long for ever, windows run round and round.
 WARY, WARIEST = 2.0, 10.0
@@ -156,24 +156,6 @@ def _go(sizes, x, u, factor, along):
             u[i, k] += along * factor.du[i, k]
 
 
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _back(sizes, x, u, factor, along, allowed, bent, prox, close):
-    """Take back so much of a step that what it has bent, which grows with its square, is what is `allowed`. Returns how much,
-    and prox, which grows with it where `close`."""
-    back = along * (1.0 - root(allowed / larger(bent, allowed)))
-    _go(sizes, x, u, factor, -back)
-    return back, where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + 0.0 * prox)), prox)
-
-
-@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _copy_places(sizes, of, to):
-    """Where the search on arcs begins, from one memory to another (N, 6)."""
-    if sizes.bends > 0:
-        for i in range(sizes.steps):
-            for c in range(3 * SETS):
-                to[i, c] = of[i, c]
-
-
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
 def solve_group(sizes, numbers, held, motion, tuning, work, found):
     """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 6, W),
@@ -205,7 +187,6 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
     lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
     for k in range(S):
         lambda_end[k] = zero
-    place = wide2(work.place, width, PLACES)
     looking = room.y, wide2(work.nearest, width, THREE), wide1(work.top, width)
     count = put_present(sizes, group, rows)
     put_rows(sizes, group, held, x, u, rows, zero, zero, looking, scratch)
@@ -274,18 +255,13 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
         allowed = larger(allowed, BENT_OF * gap_most)
         _go(sizes, x, u, factor, along)
         gap_most, off = gaps(sizes, group, x, u, gap)
-        if anywhere(active * (gap_most - linear) > active * allowed):
-            back, prox = _back(sizes, x, u, factor, along, allowed, gap_most - linear, prox, close)
+        bent = larger(gap_most - linear, allowed)
+        if anywhere(active * bent > active * allowed):
+            back = along * (1.0 - root(allowed / bent))
+            _go(sizes, x, u, factor, -back)
             along = along - back
+            prox = where(back * close > 0.0, larger(prox, smaller(prox * WARY, WARIEST + zero)), prox)
             gap_most, off = gaps(sizes, group, x, u, gap)
-        allowed = larger(BENT_ROWS + zero, broken)
-        _copy_places(sizes, rows.place, place)
-        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)
-        if anywhere(active * broken > active * allowed):
-            back, prox = _back(sizes, x, u, factor, along, allowed, broken, prox, close)
-            along = along - back
-            gap_most, off = gaps(sizes, group, x, u, gap)
-            _copy_places(sizes, place, rows.place)  # as in a lane that is not shortened
-            products, broken, owed = put_rows(sizes, group, held, x, u, rows, -back, zero, looking, scratch)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]
+        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)

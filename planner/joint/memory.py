@@ -40,7 +40,6 @@ class Work(NamedTuple):
     slope: FloatArray
     nearest: FloatArray
     top: FloatArray
-    place: FloatArray
 
 
 def work_of(sizes: Sizes, group: Group) -> Work:
@@ -51,7 +50,7 @@ def work_of(sizes: Sizes, group: Group) -> Work:
     P = 3 * SETS
     shapes = [(N, R)] * 7 + [(N, P), (N, 3), (N, P, A), (bent, P), (0,)]
     shapes += [(own, R - 8 * A - NORMAL_ROWS, S + C), (2,), (N, C, S), (N, C, C), (N, S), (N + 1, S), (N, C)]
-    shapes += [(N, S), (R,), (N, 3), (N,), (bent, P)]
+    shapes += [(N, S), (R,), (N, 3), (N,)]
     work = Work(*(np.zeros((*shape, W)) for shape in shapes))
     return work._replace(tangent=np.repeat(group.drift, P, axis=0) if bent else group.drift)
 

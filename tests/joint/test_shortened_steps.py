@@ -12,9 +12,9 @@ from planner.planning.methods.optimal import OptimalMethod
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [101, 116])
-def test_windows_end_where_rows_bend(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whole steps break rows of these jobs by more than their limits: without a check of that their windows go on to the last
-    iteration and are divided."""
+def test_windows_end_where_there_are_equal_optima(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes of these jobs slide on among equal optima where steps may bend the kinematics as much at the end as at first: their
+    windows go on to the last iteration and are divided."""
     found, search = [], TubeOwn.search
 
     def told(*asked):

@@ -139,7 +139,7 @@ def test_a_shorter_filter_costs_less():
         assert times == sorted(times)
 
 
-@pytest.mark.parametrize("method", slow_but(("stop", "fir", "fir-spline", "optimal"), METHODS))
+@pytest.mark.parametrize("method", slow_but(("stop", "optimal"), METHODS))
 def test_without_the_constraint_the_verdict_fails(method, monkeypatch):
     monkeypatch.setattr(job_module, "kept", lambda motion, toolpath, machine: motion)
     monkeypatch.setattr(

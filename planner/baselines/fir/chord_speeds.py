@@ -4,7 +4,8 @@ The command runs the guide's chords one after another at a constant speed each.
 
 What is exceeded is mended where it comes from:
 
-* error          the chords that turn, around the one that was commanded Td/2 before, get slower;
+* error          the chords that turn, around the one that was commanded Td/2 before, get slower; a corner's then last as long as the
+                 gap that paper 000 leaves between two pulses;
 * acceleration   T1 gets longer, up to 2 V/A: whatever the command, |a| <= 2 V/T1 (docs/papers.md, universal identity);
 * jerk           T1 T2 gets larger, up to 4 V/J: |j| <= 4 V/(T1 T2);
 * feed           a lower programmed feed holds on beside its block, for as long as the filters see it (`feeds_held`).

@@ -55,13 +55,11 @@ def corner_passages(
     direction = path.vector("direction")
     u1, u2 = direction[k - 1], direction[k]
     feed = np.minimum(np.append(legs.v, np.inf), np.insert(legs.v, 0, np.inf))
-    tol, limits = (
-        toolpath.tolerance[at[k]],
-        [machine.limits(q, toolpath.axes) for q in ("acceleration", "jerk")],
-    )
+    tol = toolpath.tolerance[at[k]]
+    limits = [machine.limits(quantity, toolpath.axes) for quantity in ("acceleration", "jerk")]
     ways = [
-        (JointKind.ZERO, *_zero_entry(u1, u2, tol, machine, *limits)),
-        (JointKind.ENTRY, *_entry(u1, u2, tol, machine, *limits)),
+        (JointKind.ZERO, *_zero_entry(u1, u2, tol, machine, limits)),
+        (JointKind.ENTRY, *_entry(u1, u2, tol, machine, limits)),
     ]
     if start_stop > 0:
         # no axis steps by more; the chord between two samples cuts the vertex off by up to V dt s / 2
@@ -86,32 +84,22 @@ def fitted(passage: np.recarray, legs: np.recarray) -> np.recarray:
 
 
 def _zero_entry(
-    u1: FloatArray,
-    u2: FloatArray,
-    tol: FloatArray,
-    machine: Machine,
-    acceleration: FloatArray,
-    jerk: FloatArray,
+    u1: FloatArray, u2: FloatArray, tol: FloatArray, machine: Machine, limits: list[FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Speed, alpha and eta of the corners with zero entry acceleration."""
+    """Speed, alpha and eta of the corners with zero entry acceleration; limits: (A,) accelerations and (A,) jerks of the axes."""
     across, rate = u2 - u1, error_rate(machine)
     twice = np.linalg.norm(across, axis=1)  # 2 s
-    alpha, eta = corner.ratio_min(acceleration, across), corner.ratio_min(jerk, across)
+    alpha, eta = (corner.ratio_min(limit, across) for limit in limits)
     alpha = np.minimum(alpha, np.minimum(largest_normal(machine), tol / (2.0 * rate)) / twice)
     bow = rate * twice * np.minimum(alpha, np.cbrt(6.0 * tol * eta**2 / twice))
     return corner.speed_from_middle((tol - bow) / twice, alpha, eta), alpha, eta
 
 
 def _entry(
-    u1: FloatArray,
-    u2: FloatArray,
-    tol: FloatArray,
-    machine: Machine,
-    acceleration: FloatArray,
-    jerk: FloatArray,
+    u1: FloatArray, u2: FloatArray, tol: FloatArray, machine: Machine, limits: list[FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Speed, largest entry deceleration and largest jerk of the corners with entry deceleration."""
     rate, twice = error_rate(machine), np.linalg.norm(u2 - u1, axis=1)
-    a, J = corner.entry_limits(u1, u2, acceleration, jerk)
+    a, J = corner.entry_limits(u1, u2, *limits)
     a = np.minimum(a, np.minimum(2.0 * largest_normal(machine) / twice, tol / (2.0 * rate)))
     return corner.entry_speed_from_middle((tol - rate * a) / twice, a, J), a, J

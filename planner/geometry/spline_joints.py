@@ -5,9 +5,8 @@ so within the tolerance: its shape slides along the path, by several tolerances 
 curve is matched with the path in order (geometry/point_matching.py), at points whose chords leave it by
 `CHORD_FRACTION` of the tolerance at most. A joint V is passed where the curve C is nearest to it, (C - V) . C'
 = 0, next to where it was matched; those that would not be in order are passed together, V the mean of them.
-Points of an arc that are `ARC_ANGLE` apart are passed
-likewise. Behind the place of a joint the feed is that of the next block; it is found to rounding where the
-feed changes.
+Points of an arc that are `ARC_ANGLE` apart are passed likewise. Behind the place of a joint the feed is that
+of the next block; it is found to rounding where the feed changes.
 """
 
 from typing import NamedTuple

@@ -2,8 +2,10 @@
 
 The control points of the first spline are the places of the corridor's chain at the spline's Greville
 abscissae: a smoothed chain that leaves it only at corners, and the less, the denser the knots are. Where it
-uses more than `ROOM` of the tolerance, knots are added, `DENSER_MAX` times at most. What is within `INSIDE` of
-it is a start for the relaxation (relax.py). Only spans with sites outside of that are no spline, and the run
+uses more than `ROOM` of the tolerance, knots are added, which moves the knots of the whole run a little: on a
+long run some site always ends a little beyond `ROOM`. That does no harm: what is within `INSIDE` of the
+tolerance is a start for the relaxation (relax.py). So after `ROOMY` times only a run that uses more than
+`INSIDE` gets more, `DENSER_MAX` times at most. Only spans with sites outside of that are no spline, and the run
 is to be cut there (spline_path.py).
 
 Knots are near to each other where the path turns much within its tolerance. A control polygon that follows
@@ -113,6 +115,7 @@ def spread(place, h, begin, end, longest, least):
 
 ROOM = 0.85  # of the tolerance that a first spline should use [-]
 DENSER = 0.75  # factor on the distance of knots where it uses more [-]
+ROOMY = 8  # so many times for `ROOM` alone: a relief of 6,000 blocks in one run takes as many, one of 30,000 would never end
 DENSER_MAX = 16  # so many times at most: knots are 100 times as dense then
 INSIDE = 0.99  # of the tolerance that it may use in the end [-]: the relaxation starts strictly inside of its own corridor, relax.USED
 SPANS_MIN = 8  # of a run: with five control points fixed at either end three are left to move
@@ -187,7 +190,8 @@ def _lay_run(corridor, longest):
         control = greville_control(corridor, breaks)
         sites = sites_of_run(corridor, knots_at(breaks))
         used = used_share(sites, control)
-        if attempt == DENSER_MAX or not (used > ROOM).any():
+        room = ROOM if attempt < ROOMY else INSIDE
+        if attempt == DENSER_MAX or not (used > room).any():
             break
         attempt += 1
         h = _denser(h, inner, sites, breaks, used)

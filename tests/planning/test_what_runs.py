@@ -84,6 +84,7 @@ def test_an_attempt_that_makes_no_plan_leaves_it_to_the_next(monkeypatch: pytest
     steps = steps_of(CORNERS)
     assert [name for name in steps if name in names] == names
     assert steps.count("search") == 2
+    assert "splines" in steps  # those that the search began with, handed on
 
 
 def test_a_finished_plan_has_its_prices_and_nothing_that_only_planning_needs() -> None:

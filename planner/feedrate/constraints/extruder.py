@@ -33,7 +33,7 @@ class ExtruderLimit(PathLimit):
             self._bounds = limits[:, None] / ratio
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
-        """Largest speed, acceleration and jerk along the path (n,) on the blocks of the places [mm/s, ...]."""
+        """Largest speed, acceleration and jerk along the path (n,) on the blocks of the places [mm/s, mm/s2, mm/s3]."""
         velocity, acceleration, jerk = self._bounds[:, at.block]
         return velocity, acceleration, jerk
 

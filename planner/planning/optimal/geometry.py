@@ -44,7 +44,7 @@ def splined_with_stops(
 ) -> Laid:
     """The splines of a path, as they are laid, and the path with full stops where runs get none (module text)."""
     shape = spline_shape(rounded, machine)
-    _tell_of(shape, tell, 0)
+    tell_splines(shape, tell, 0)
     for again in range(STOP_ROUNDS):
         at = lost_joints(rounded, shape, fence=again == STOP_ROUNDS - 1)
         if not len(at):
@@ -52,11 +52,12 @@ def splined_with_stops(
         stopping = rounded.toolpath.with_joints(at, Joint.STOP)
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
         shape = spline_shape(rounded, machine)
-        _tell_of(shape, tell, len(at))
+        tell_splines(shape, tell, len(at))
     return rounded, shape.laid()
 
 
-def _tell_of(shape: SplineShape, tell: Tell, stops: int) -> None:
+def tell_splines(shape: SplineShape, tell: Tell, stops: int) -> None:
+    """Tell of splines as they are laid, for which so many full stops were added."""
     fits = shape.splines.fits
     tell(
         "splines",

@@ -18,6 +18,7 @@ from planner.base.names import AUTO, QUICK, SPLINE
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status
+from planner.geometry.toolpath import Joint
 from planner.machine import Machine
 from planner.motion.shaping import ShapedMotion
 from planner.motion.slowed import times_of_pieces
@@ -28,7 +29,7 @@ from planner.planning.job.trace import Tell, tell_nobody
 from planner.planning.optimal.behind_filters import within_filters
 from planner.planning.optimal.compare_corners import corner_bounds, with_corners
 from planner.planning.optimal.effort import COARSE, EFFORTS, Grids, Settings
-from planner.planning.optimal.geometry import Laid, corner_shape, splined_with_stops
+from planner.planning.optimal.geometry import Laid, corner_shape, splined_with_stops, tell_splines
 from planner.planning.optimal.notes import no_spline_note, not_compared_note, path_notes
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.tighten import within_limits
@@ -93,6 +94,9 @@ def time_optimal(job: Job, settings: Settings, laid: Laid | None = None) -> OnPa
         given = _rounded(job, settings)
         return order.solve(given, job, grids_for(given, job, settings).final)
     rounded, splines = laid or _splined(job, settings, job.tell)
+    if laid:
+        added = (rounded.toolpath.joint == Joint.STOP).sum() - (job.toolpath.joint == Joint.STOP).sum()
+        tell_splines(splines, job.tell, int(added))
     if not splines.splines.fits.any():
         given = _rounded(job, settings)
         cornered = order.solve(given, job, grids_for(given, job, settings).final)

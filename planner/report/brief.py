@@ -40,8 +40,8 @@ FURTHER = {
 }
 
 
-def brief_rows(plan: Plan, units: Units, told: Rows | None = None) -> Rows:
-    """Labels and texts of time, tools, what is saved and what limits, tolerance and verdict; `told` are the rows of the
+def brief_rows(plan: Plan, units: Units, summed: Rows | None = None) -> Rows:
+    """Labels and texts of time, tools, what is saved and what limits, tolerance and verdict; `summed` are the rows of the
     plan's summary, if there is one: the control's planner is not asked again."""
     if plan.trajectory is None or plan.verdict is None:
         return [("time", "-"), (VERDICT, f"not solved: {plan.sentence}")]
@@ -50,7 +50,7 @@ def brief_rows(plan: Plan, units: Units, told: Rows | None = None) -> Rows:
     if tools:
         said = first_of([f"{name or 'before'} {seconds:.4g} s" for name, seconds in tools.items()], TOOLS)
         rows.append(("tools", ", ".join(said)))
-    rows += saved_rows(plan) if told is None else [(name, text) for name, text in told if name == SAVED]
+    rows += saved_rows(plan) if summed is None else [(name, text) for name, text in summed if name == SAVED]
     if plan.grid is not None:
         ranked = [(limit_text(name), round(100.0 * share)) for name, share in plan.grid.ranked()]
         told = [f"{name} {percent} %" for name, percent in ranked if percent][:LIMITS]

@@ -40,9 +40,8 @@ class Sizes:
     times_at_once: int = _size(PARTS, 100_000, 350)  # of a finely sampled motion: 20 MB
     row_group: int = _size(PARTS, 2**18, 101)  # samples in memory while a file is written: 35 MB
     text_rows: int = _size(PARTS, 100_000, 60)  # setpoints written as text together: 10 MB
-    program_rows: int = _size(
-        PARTS, 100_000, 50
-    )  # of a program in a language that are executed together, at most
+    # of a program in a language that are executed together, at most
+    program_rows: int = _size(PARTS, 100_000, 50)
     idle_rows: int = _size(PARTS, 2_000, 20)  # the same at first, and as long as nothing moves
     turns_at_once: int = _size(PARTS, 500, 5)  # of loops and jumps between two looks at their number
 

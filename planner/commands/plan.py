@@ -108,7 +108,7 @@ def plan_command(
     from planner import plan
     from planner.nc.reader import read_program
     from planner.planning.job.trace import Stages, Trace
-    from planner.report.export import SUMMARY, check_places, files_to_keep, write_plan
+    from planner.report.export import OF_FILES, SUMMARY, check_places, files_to_keep, write_plan
     from planner.report.replace import check_file, write_whole
     from planner.report.summary import summary
     from planner.report.tables import assumed_lines, brief_table, corners_table, plan_table
@@ -145,17 +145,19 @@ def plan_command(
 
     if trace is not None:
         write_whole(trace, json.dumps(_trace(steps, result), indent=1, allow_nan=False) + "\n")
-    said = summary(result)
     if written and output is not None:  # with what was not written, and why
-        said["notes"] = json.loads((output / SUMMARY).read_text(encoding="utf-8"))["notes"]
+        said = json.loads((output / SUMMARY).read_text(encoding="utf-8"))
+        said = {name: value for name, value in said.items() if name not in OF_FILES}
+    else:
+        said = summary(result)
     if as_json:
         say_json(said)
     else:
         shown_in = units_of(result.program, units)
         if verbose:
-            show(*assumed_lines(result.program.assumptions), plan_table(result, said["notes"]))
+            show(*assumed_lines(result.program.assumptions), plan_table(result, said))
         else:
-            show(brief_table(result, shown_in, said["notes"]))
+            show(brief_table(result, shown_in, said))
         if corners:
             show("", corners_table(result.corners, shown_in) or NO_CORNERS)
         if written:

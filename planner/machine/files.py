@@ -18,7 +18,9 @@ _SETTINGS = re.compile(
     r"^\s*(\[(EMC\w*|TRAJ|AXIS_\w|printer)\]|\$\d+\s*=|(echo:)?\s*M20[13]\s+X)", re.MULTILINE
 )
 
+# Of programs. Machine files may have a key M6 or x.velocity, Klipper's settings macros, but these have tables or names too.
 _PROGRAM = re.compile(r"^\s*/?(N\d+\s*)?([GMT]\d|[XYZ][-+.\d])", re.MULTILINE | re.IGNORECASE)
+_TABLE = re.compile(r"^\s*(\[|[a-z_.]{2,}\s*=)", re.MULTILINE)
 SIZE_MAX = 1_000_000  # bytes of a machine file: ten thousand tools
 # A key of more parts than there are tables in tables.
 _DEEP = re.compile(r"^[^=\n#]*(?:\.[^=\n#.]*){50}", re.MULTILINE)
@@ -42,11 +44,10 @@ def load_machine(path: str | Path) -> Machine:
     except RecursionError:
         raise InputError(deep, source=source) from None
     except ValueError as fault:
-        settings = "; a machine file is made of a control's settings by: planner machine import"
-        settings *= bool(_SETTINGS.search(text))
-        is_toml = isinstance(fault, tomllib.TOMLDecodeError)
+        is_toml, of_control = isinstance(fault, tomllib.TOMLDecodeError), _SETTINGS.search(text) is not None
+        settings = "; a machine file is made of a control's settings by: planner machine import" * of_control
         reason = fault if is_toml else "a number has more than 4,300 digits"
-        if _PROGRAM.search(text):
+        if _PROGRAM.search(text) and not of_control and not _TABLE.search(text):
             said = f"an NC program, where a machine file is needed: a TOML file, or one of {', '.join(builtin_machines())}"
             raise InputError(said, source=source) from None
         decimal = _DECIMAL.search(text)

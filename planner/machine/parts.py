@@ -53,7 +53,7 @@ AxisLimit = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_u
 
 
 class Record(BaseModel):
-    """Frozen, without other keys than its own. To set one raises AttributeError."""
+    """Frozen, without other keys than its own. To set one raises AttributeError, which says how to make another record."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 

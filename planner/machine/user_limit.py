@@ -66,9 +66,7 @@ class OwnLimit(Protocol):
 
     name: str  # what the verdict calls it: "velocity.NAME", "acceleration.NAME", "jerk.NAME"
     unit: str  # of q
-    turn: (
-        float | None
-    )  # what q may jump by because it starts again, 2 pi for an angle of arctan2; None for nothing
+    turn: float | None  # by which q may jump as it starts again, 2 pi of an arctan2; None where it does not
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:
         """Largest velocity, acceleration and jerk at the places; inf where nothing limits."""
@@ -170,7 +168,8 @@ def check_names(limits: Sequence[OwnLimit], taken: Sequence[str]) -> None:
 
 
 def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
-    """(n, 3) bounds of velocity, acceleration and jerk. Raises InputError for what is no bound."""
+    """(n, 3) bounds of velocity, acceleration and jerk at n = `count` places, in the limit's unit and s. Raises
+    InputError for one that is not above 0, with its place, and for an array of another shape than (n,)."""
     found = np.empty((count, 3))
     for k, bound in enumerate(limit.bounds(at)):
         said = f"limit '{limit.name}': {QUANTITIES[k]}"
@@ -189,7 +188,7 @@ def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
 
 def limit_derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
     """(3, n) the first three derivatives of q where the position has the value and the derivatives `motion`,
-    4 arrays (n, A), with respect to whatever they are. Raises InputError where they are not finite."""
+    4 arrays (n, A), with respect to whatever those are. Raises InputError where they are not finite."""
     table = np.stack(motion)
     columns = [Series(table[:, :, k]) for k in range(len(axes))]
     found = limit.value(Place(axes, columns, table[1]))

@@ -257,13 +257,14 @@ def _tables(value: Any) -> Any:
     return [_tables(one) for one in value] if isinstance(value, list | tuple) else value
 
 
+_TABLES: dict[str, type[Record]] = {
+    **{"axes": Axis, "fir": Fir, "modes": Mode, "plotter": Plotter, "dialect": DialectData},
+    **{"times": Times, "kinematics": KinematicsData, "control": ControlData, "tools": ToolData},
+}
 # The keys of the machine, under "", and of each table, that an unknown one may be meant for.
 _KEYS = {
     "": [*Machine.model_fields, "tolerance_angle"],
-    **{"axes": [*Axis.model_fields], "modes": [*Mode.model_fields], "tools": [*ToolData.model_fields]},
-    **{"fir": [*Fir.model_fields], "plotter": [*Plotter.model_fields], "times": [*Times.model_fields]},
-    **{"dialect": [*DialectData.model_fields], "control": [*ControlData.model_fields]},
-    "kinematics": [*KinematicsData.model_fields],
+    **{table: [*record.model_fields] for table, record in _TABLES.items()},
 }
 
 

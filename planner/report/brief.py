@@ -12,7 +12,17 @@ import numpy as np
 from planner.controls.timing.times import by_name, tools_of
 from planner.feedrate.constraints.limits import TANGENTIAL
 from planner.planning.job.notes import tolerance_notes
-from planner.report.rows import FAILED, PASSED, VERDICT, Rows, beside_rows, first_of, hours_text, saved_rows
+from planner.report.rows import (
+    FAILED,
+    PASSED,
+    SAVED,
+    VERDICT,
+    Rows,
+    beside_rows,
+    first_of,
+    hours_text,
+    saved_rows,
+)
 from planner.report.units import Units
 from planner.report.word_feed import planned_blocks
 
@@ -30,8 +40,9 @@ FURTHER = {
 }
 
 
-def brief_rows(plan: Plan, units: Units) -> Rows:
-    """Labels and texts of time, tools, what is saved and what limits, tolerance and verdict."""
+def brief_rows(plan: Plan, units: Units, summed: Rows | None = None) -> Rows:
+    """Labels and texts of time, tools, what is saved and what limits, tolerance and verdict; `summed` are the rows of the
+    plan's summary, if there is one: the control's planner is not asked again."""
     if plan.trajectory is None or plan.verdict is None:
         return [("time", "-"), (VERDICT, f"not solved: {plan.sentence}")]
     rows: Rows = [("time", _time(plan))]
@@ -39,7 +50,7 @@ def brief_rows(plan: Plan, units: Units) -> Rows:
     if tools:
         said = first_of([f"{name or 'before'} {seconds:.4g} s" for name, seconds in tools.items()], TOOLS)
         rows.append(("tools", ", ".join(said)))
-    rows += saved_rows(plan)
+    rows += saved_rows(plan) if summed is None else [(name, text) for name, text in summed if name == SAVED]
     if plan.grid is not None:
         ranked = [(limit_text(name), round(100.0 * share)) for name, share in plan.grid.ranked()]
         told = [f"{name} {percent} %" for name, percent in ranked if percent][:LIMITS]

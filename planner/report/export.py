@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 PLANNED = "planned.ngc"
 KEPT = "program"  # the program in the directory of its plan, with the suffix of its file
+OF_FILES = ("run_id", "files", "sha256")  # what `summary.json` has besides the summary of the plan
 
 
 def write_plan(
@@ -105,7 +106,7 @@ def write_plan(
             (new / REPORT).write_text(page, encoding="utf-8")
         sums = checksums(new)
         names = sorted([SUMMARY, *sums])
-        said |= {"run_id": run_id, "files": names, "sha256": sums}
+        said |= dict(zip(OF_FILES, (run_id, names, sums), strict=True))
         (new / SUMMARY).write_text(json.dumps(said, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return names
 

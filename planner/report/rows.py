@@ -41,9 +41,11 @@ def plan_rows(plan: Plan) -> Rows:
         rows.append(("cycle time", f"{time:.4f} s{hours_text(time)}"))
         rows += saved_rows(plan)
         if plan.least_time:  # 0 where the tolerance allows to stay where one is
-            above = 100.0 * (time / plan.least_time - 1.0)
-            said = f"{plan.least_time:.4f} s or more, certified; this motion is {above:.2g} % above that"
-            said += WEAK if above > WEAK_ABOVE else ""
+            above = time / plan.least_time - 1.0
+            said = (
+                f"{plan.least_time:.4f} s or more, certified; this motion is {percent_text(above)} above that"
+            )
+            said += WEAK if 100.0 * above > WEAK_ABOVE else ""
             rows.append(("fastest possible", said))
         rows += beside_rows(plan.beside, time, float(plan.program.dwell.sum()))
     if plan.verdict is not None:
@@ -65,6 +67,9 @@ def plan_rows(plan: Plan) -> Rows:
 NAMES = {"linuxcnc": "LinuxCNC", "klipper": "Klipper", "marlin": "Marlin"}
 
 
+SAVED = "saved"
+
+
 def saved_rows(plan: Plan) -> Rows:
     """What is saved against the planner of the control that the machine names, else against a stop at every block."""
     if plan.method == "stop" and plan.machine.control is None:
@@ -73,19 +78,25 @@ def saved_rows(plan: Plan) -> Rows:
     time, found = plan.trajectory.cycle_time, control_of(plan)
     other, takes, why = "a stop at every block", plan.stop_time, ""
     if found is not None:
-        other, takes = (
-            f"{NAMES.get(found.control, found.control)}'s own planner (our model of it)",
-            found.seconds,
-        )
+        other = f"{NAMES.get(found.control, found.control)}'s own planner (our model of it)"
+        takes = found.seconds
         why = ", which limits no jerk" if plan.verdict and "jerk" not in plan.verdict.not_limited else ""
-    elif np.isfinite(plan.machine.powers(plan.toolpath.axes)).any():
-        return [("saved", "not known: a stop at every block is planned without the limits of drive power")]
+    elif without := _not_in_stop_time(plan):
+        return [(SAVED, f"not known: {other} is planned without the limits of {', '.join(without)}")]
     if not np.isfinite(takes):
-        return [("saved", "not known")]
+        return [(SAVED, "not known")]
     saved, gain = takes - time, NOTHING
     if saved > SAVED_SHOWN * takes:
-        gain, why = f"{saved:.4g} s, {100.0 * saved / takes:.2g} %", ""
-    return [("saved", f"{gain}, against {other}{why}: {takes:.4f} s of motion")]
+        gain, why = f"{saved:.4g} s, {percent_text(saved / takes)}", ""
+    return [(SAVED, f"{gain}, against {other}{why}: {takes:.4f} s of motion")]
+
+
+def _not_in_stop_time(plan: Plan) -> list[str]:
+    """The limits of the motion that `Plan.stop_time` leaves out."""
+    of_joints = plan.joints is not None
+    powered = np.isfinite(plan.machine.powers(plan.toolpath.axes)).any()
+    own = [limit.name for limit in plan.machine.own] if not of_joints else ["the joints"]
+    return own + ["drive power"] * bool(powered)
 
 
 def control_of(plan: Plan) -> ControlTimes | None:
@@ -94,13 +105,17 @@ def control_of(plan: Plan) -> ControlTimes | None:
     control, tolerance = plan.machine.control, plan.toolpath.tolerance
     if control is None or control.name not in TIMED:
         return None
-    same = (
-        float(tolerance[0]) if (tolerance == tolerance[0]).all() else None
-    )  # which --tolerance may have given
+    asked = float(tolerance[0]) if (tolerance == tolerance[0]).all() else None  # by --tolerance, or of all
     try:
-        return control_times(plan.program, plan.machine, control.name, same)
+        return control_times(plan.program, plan.machine, control.name, asked)
     except InputError:
         return None
+
+
+def percent_text(share: float) -> str:
+    """A share in per cent, with two digits or more."""
+    percent = 100.0 * share
+    return f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
 
 
 def extent_rows(low: FloatArray, high: FloatArray, work: tuple[FloatArray, FloatArray] | None) -> Rows:

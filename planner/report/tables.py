@@ -45,22 +45,23 @@ NOTES_SHOWN = 8
 ASSUMED_SHOWN = 8
 
 
-def plan_table(plan: Plan, notes: Sequence[str] | None = None) -> Group:
+def plan_table(plan: Plan, summary: Mapping[str, Any] | None = None) -> Group:
     """The plan in a dozen lines: times, largest ratios, errors, corners, active limits, savings, computing
     time, how it was solved.
 
-    notes : printed below, without what `assumed_lines` says first; None for those of the plan
+    summary : of the plan, if there is one: its rows are printed, and below its notes without what `assumed_lines` says first
     """
     first = set(plan.program.assumptions)
-    said = [note for note in (plan.notes if notes is None else notes) if note not in first]
-    below = [Text(f"note: {note}") for note in first_of(said, NOTES_SHOWN)]
-    return titled(_title(plan), _pairs(plan_rows(plan)), *below)
+    notes, told = (plan.notes, plan_rows(plan)) if summary is None else (summary["notes"], summary["told"])
+    below = [Text(f"note: {note}") for note in first_of([n for n in notes if n not in first], NOTES_SHOWN)]
+    return titled(_title(plan), _pairs(told), *below)
 
 
-def brief_table(plan: Plan, units: Units, notes: Sequence[str] | None = None) -> Group:
-    """The plan in eight lines, as report/brief.py says; `notes` as there, None for those of the plan."""
-    table = _pairs(brief_rows(plan, units))
-    above, below = note_lines(plan, plan.notes if notes is None else notes)
+def brief_table(plan: Plan, units: Units, summary: Mapping[str, Any] | None = None) -> Group:
+    """The plan in eight lines, as report/brief.py says; notes and what is saved as in `plan_table`."""
+    notes, told = (plan.notes, None) if summary is None else (summary["notes"], summary["told"])
+    table = _pairs(brief_rows(plan, units, told))
+    above, below = note_lines(plan, notes)
     first = [Text(line, style="yellow") for line in above]
     return Group(*first, titled(_title(plan), table, *map(Text, below)))
 

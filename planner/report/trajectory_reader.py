@@ -75,8 +75,8 @@ def read_trajectory(path: str | Path) -> TrajectoryFile:
 
     Required are `t` [s] and at least one column for an axis [mm]. Missing velocities, accelerations and jerks
     are divided differences of the other columns, at rest before the first sample and after the last; a
-    missing `s` is the length of the polyline through the samples, a missing `feed` the speed on it. Missing
-    `line` and `block` are 0 and -1, "unknown".
+    missing `s` is the length of the polyline through the samples, a missing `feed` the speed on it, 0 at the
+    ends of positions alone. Missing `line` and `block` are 0 and -1, "unknown".
 
     Raises InputError naming the file and the column.
     """
@@ -231,9 +231,16 @@ def _assemble(
             notes.append(f"{word} derived from the {_LEVELS[base]} (no column {', '.join(lacking)})")
     position, velocity, *_ = levels
     linear = [k for k, axis in enumerate(axes) if axis not in ROTARY_AXES]
+
+    def feed() -> FloatArray:
+        speed = np.linalg.norm(velocity[:, linear], axis=1)
+        if 1 not in there:  # a difference over the first period is no speed at its start
+            speed[[0, -1]] = 0.0
+        return speed
+
     fill: dict[str, Callable[[], Array]] = {
         "s": lambda: np.append(0.0, np.cumsum(np.linalg.norm(np.diff(position[:, linear], axis=0), axis=1))),
-        "feed": lambda: np.linalg.norm(velocity[:, linear], axis=1),
+        "feed": feed,
         "line": lambda: np.zeros(len(t)),
         "block": lambda: np.full(len(t), -1),
     }

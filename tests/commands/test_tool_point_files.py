@@ -147,3 +147,9 @@ def test_the_picture_has_the_tool(made: Path) -> None:
     assert np.allclose(begin, [0.0, 0.0, 1.0])
     tilt, turn = np.deg2rad([6.0, 5.0])
     assert np.allclose(end, [np.sin(turn) * np.sin(tilt), np.cos(turn) * np.sin(tilt), np.cos(tilt)])
+
+
+@pytest.mark.slow
+def test_stops_that_know_no_joint_are_not_compared_with(made: Path) -> None:
+    told = dict(json.loads((made / "out" / "summary.json").read_text())["told"])
+    assert told["saved"].endswith("without the limits of the joints")

@@ -35,6 +35,11 @@ def refusal(path: Path) -> str:
     [
         (None, "machine file not found"),
         ("name = ", "not valid TOML"),
+        ("G21\nG0 X1\n", "an NC program, where a machine file is needed"),
+        ("M201 X3000 Y3000\n", "planner machine import"),
+        ("[printer]\nkinematics: corexy\n[gcode_macro A]\ngcode:\n  G28\n", "planner machine import"),
+        ('dt = 0,001\n[macros]\nM6 = "CHANGE"\n', "decimals have a point: 0.001"),
+        ("name = 'a'\nx.velocity = 3,5\n", "decimals have a point: 3.5"),
         ("", "name: missing"),
         (
             with_line("[axes.y]\nvelocity = 500.0\nacceleration = 4000.0\njerk = 100000.0\n", ""),

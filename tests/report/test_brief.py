@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,13 +14,16 @@ from test_tables import text
 import planner
 from planner.controls.timing.times import control_times
 from planner.machine import ControlData, load_machine
+from planner.machine.user_limit import JointLimit
 from planner.nc.reader import parse_program
 from planner.planning.job.beside import Beside
+from planner.report import rows
 from planner.report.brief import brief_rows, limit_text, tool_times
 from planner.report.rows import NAMES, control_of, plan_rows
 from planner.report.summary import summary
 from planner.report.tables import brief_table
 from planner.report.units import UNITS, units_of
+from tests.commands.command_line import run
 
 
 def test_eight_lines_without_a_symbol_of_papers() -> None:
@@ -38,6 +43,51 @@ def test_what_is_saved_against_a_stop_and_never_less_than_nothing() -> None:
     assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith("nothing, against a stop at every block")
     plan.stop_time = 0.5
     assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith("nothing, against a stop at every block")
+
+
+def test_many_times_as_long_is_told_in_digits() -> None:
+    plan = make_plan()
+    plan.stop_time = 300.0 * plan.trajectory.cycle_time
+    assert ", 100 %, against a stop" in dict(brief_rows(plan, UNITS["mm"]))["saved"]
+    plan.least_time = 0.4 * plan.trajectory.cycle_time
+    assert "this motion is 150 % above that" in dict(plan_rows(plan))["fastest possible"]
+
+
+def test_nothing_is_saved_against_stops_that_break_limits() -> None:
+    """A stop at every block knows neither limits of one's own nor those of joints."""
+    job = planner.read_program(text="G1 X10 F3000\nY10\nX0\nY0\n")
+    plan = planner.plan(job, load_machine("mill").with_own([Sum()]), effort="quick")
+    assert plan.cycle_time > plan.stop_time
+    assert "without the limits of sum" in dict(brief_rows(plan, UNITS["mm"]))["saved"]
+
+
+class Sum(JointLimit):
+    name, velocity = "sum", 5.0
+
+    def joint(self, at: Any) -> Any:
+        return at.x + at.y
+
+
+def test_the_control_is_asked_once_for_terminal_and_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+    real = rows.control_times
+    monkeypatch.setattr(rows, "control_times", lambda *of: asked.append(of) or real(*of))
+    (tmp_path / "part.nc").write_text("G21 G64 P0.05\nG1 X10 F600\nY10\nM2\n")
+    for words in (
+        [],
+        ["-v"],
+        ["--json"],
+        ["-o", tmp_path / "out", "--report"],
+        ["-o", tmp_path / "out", "--json"],
+    ):
+        asked.clear()
+        done = run("plan", tmp_path / "part.nc", "-m", "boss", "--method", "kinematic", *words)
+        assert done.exit_code == 0
+        assert "LinuxCNC's own planner" in done.output.replace("\n", " ")
+        assert len(asked) == 1
+        assert "sha256" not in done.output
 
 
 def test_what_is_saved_against_the_control_that_the_machine_names() -> None:

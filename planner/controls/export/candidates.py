@@ -41,12 +41,8 @@ LESS = 0.9  # of the tolerance: what a plan should take that leaves room for cho
 LITTLE = 0.05  # of the tolerance: room below this is worth a note
 AS_IT_IS = "program as it is"
 OWN_PATH = "program's own path, in the control's words"
-SHARES = (
-    1.0,
-    0.5,
-    0.25,
-    0.1,
-)  # of the room, for chords: wider ones are fewer lines, narrower ones turn less at each
+# Of the room, for chords: wider ones are fewer lines, narrower ones turn less at each.
+SHARES = (1.0, 0.5, 0.25, 0.1)
 # The same for LinuxCNC; the rest is P.
 LINUXCNC_SHARES = (0.6, 0.3, 0.1, 0.02)
 FINEST = 2e-4  # chords closer than this [mm] are held up by the rounding of coordinates: 0.1 um of them made it 10 % slower
@@ -144,9 +140,7 @@ class Candidates:
 
     def written(self, chosen: Candidate) -> tuple[bytes, tuple[str, ...]]:
         """The file of a candidate, and notes on it. Raises InputError for a line without words there."""
-        if (
-            chosen.replaced is None
-        ):  # the path mode is on a line of its own, after the percent sign if there is one
+        if chosen.replaced is None:  # the path mode stands on a line of its own, behind a percent sign
             assert self.text is not None
             percent = re.match(rb"\s*%[^\n]*\n", self.text)
             cut = percent.end() if percent else 0

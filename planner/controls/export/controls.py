@@ -74,24 +74,8 @@ _IDLE_ON_PRINTERS = {
     "G54": "this control has no work offsets: its zero is the program's",
     "G94": "F is always per minute there",
 }
-_PRINTER = {
-    17,
-    18,
-    82,
-    83,
-    84,
-    *range(104, 108),
-    109,
-    114,
-    115,
-    *range(117, 120),
-    140,
-    190,
-    204,
-    220,
-    221,
-    400,
-}
+_PRINTER = {17, 18, 82, 83, 84, *range(104, 108), 109, 114, 115, *range(117, 120)}
+_PRINTER |= {140, 190, 204, 220, 221, 400}
 
 GRBL = Control(
     name="grbl",
@@ -167,7 +151,7 @@ def is_setting(words: list[Word], control: Control) -> bool:
 
 
 def sets_tools(row: Row) -> bool:
-    """Whether G10 or G43.1 say what grbl lacks: more than an origin (L1, L10, L11; R), or a length in Z."""
+    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z: grbl knows neither."""
     kind, g = row.value("L"), row.g()
     more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
     return (G10 in g and more) or (431 in g and (row.value("X") or row.value("Y")) is not None)
@@ -177,7 +161,7 @@ def takes_move(row: Row, control: Control, reading: Reading) -> bool:
     """Whether the control is given a move in the program's own words."""
     if row.radius and not control.cycles:
         return False
-    if row.motion in codes.ARCS:  # grbl knows none with turns, and nobody's centres are absolute
+    if row.motion in codes.ARCS:  # none with turns for grbl, none with absolute centres for any
         known = control.arcs and reading.arc_centres != ABSOLUTE
         return known and (control.cycles or row.value("P") is None)
     return row.motion <= 30 or (control.cycles and row.motion in control.g)

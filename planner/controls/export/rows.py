@@ -67,11 +67,11 @@ class Word:
 class Row:
     """A line of a program with at least one word.
 
-    words    : those of RS274NGC's moves, modes and switches; line numbers are left out
-    others   : codes of other kinds, each with the words that are its own: settings, names, messages, what the
-               user leaves out
-    text     : the line without its comments and number, where it is no words: homing, commands to the control
-    absolute, inch, per_minute : G90, G20 and G94 are in force at its end
+    words  : those of RS274NGC's moves, modes and switches; line numbers are left out
+    others : codes of other kinds, each with the words that are its own: settings, names, messages, what the
+             user leaves out
+    text   : the line without its comments and number, where it is no words: homing, commands to the control;
+             "" otherwise
     """
 
     line: int  # 1-based
@@ -81,15 +81,13 @@ class Row:
     first: int  # its blocks are those from here ...
     last: int  # ... to before here
     motion: int = -1  # motion code in tenths that its coordinates belong to; -1 for none
-    absolute: bool = True
-    inch: bool = False
+    absolute: bool = True  # G90 is in force at its end ...
+    inch: bool = False  # ... and G20 ...
+    per_minute: bool = True  # ... and G94
     inch_before: bool = False  # G20 was in force before it, which its F word is read in
-    per_minute: bool = True
     plane: str = "XY"  # letters of the axes of arcs
     radius: bool = False  # cutter radius compensation acts on it, or ends with it
-    placed: frozenset[str] = (
-        frozenset()
-    )  # letters of axes whose place the program's words have told before it
+    placed: frozenset[str] = frozenset()  # letters of axes whose place words before it have told
     plain: bool = False  # chords may replace what it moves
 
     def g(self) -> list[int]:

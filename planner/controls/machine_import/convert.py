@@ -36,11 +36,11 @@ CONTROLS: dict[str, ModuleType] = {"linuxcnc": linuxcnc, "klipper": klipper, "ma
 
 @dataclass(frozen=True)
 class Imported:
-    """text of the machine file; what it holds; what the settings do not say, one sentence each"""
+    """A machine file made of a control's settings."""
 
-    text: str
-    machine: Machine
-    assumed: tuple[str, ...]
+    text: str  # of the file
+    machine: Machine  # what it holds
+    assumed: tuple[str, ...]  # what the settings do not say, one sentence each
 
 
 def import_machine(

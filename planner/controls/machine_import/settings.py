@@ -127,7 +127,7 @@ class Settings:
         return Sourced(value * scale, place)
 
     def positive(self, table: str, key: str, scale: float = 1.0) -> Sourced | None:
-        """`number`. Raises InputError if it is none above 0."""
+        """As `number`, which must be above 0. Raises InputError if it is not."""
         found = self.number(table, key, scale)
         if found is not None and found.value <= 0:
             text, source, line = self._found[table, key][0]

@@ -48,7 +48,7 @@ class ControlTimes:
     """What a control takes for a program."""
 
     control: str  # its name
-    seconds: float  # in all, dwells included
+    seconds: float  # in all, dwells included [s]
     dwells: float  # of that, standing still [s]
     moves: int  # that its planner gets
     # seconds by name, in the order of the program; empty where there are none
@@ -112,9 +112,8 @@ def standing(program: Program, block: Array, *, switches: bool) -> Array:
     return stands
 
 
-_Timed = tuple[
-    Array, FloatArray, int, tuple[str, ...]
-]  # block and seconds (n,) of moves, how many, what is assumed
+# Block and seconds (n,) of moves, how many there are, what is assumed.
+_Timed = tuple[Array, FloatArray, int, tuple[str, ...]]
 
 
 def _on_the_path(program: Program, toolpath: Toolpath, machine: Machine, name: str, text: bytes) -> _Timed:

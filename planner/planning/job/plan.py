@@ -84,7 +84,8 @@ class Plan(Shown):
     grid                : the profile at the grid points, or None
     prices              : cycle time saved per limit, or None where the solver gives no multipliers
     making              : of a plan on its way what only planning needs; None in a finished one
-    stop_time           : cycle time if every block ran from rest to rest [s], dwells included
+    stop_time           : cycle time if every block ran from rest to rest [s], dwells included, without limits of one's own,
+                          of joints behind the tool centre point and of drive power
     grid_points         : number of grid points of the problem that was solved
     notes               : what was assumed and what was given up, each with its first line and a count
     timings             : computing time by stage [s]

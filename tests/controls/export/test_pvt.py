@@ -12,9 +12,12 @@ from scipy.interpolate import CubicHermiteSpline
 from planner.base.errors import InputError
 from planner.controls.export.tables import PERIODS_MAX, Table, laser_power, longest_interval, write_table
 from planner.machine import load_machine
+from planner.motion.pulses import pulses_of
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
 from planner.planning.methods.stop import StopMethod
+from planner.report.trajectory_file import write_pulses
+from planner.report.trajectory_reader import read_trajectory
 
 
 @pytest.fixture(scope="module")
@@ -136,3 +139,19 @@ def test_laser_power_follows_the_real_speed() -> None:
     assert power[inside(0, 10)].max() == pytest.approx(800.0, rel=1e-3)
     for (a, b), want in (((10, 20), 0.0), ((20, 30), 800.0), ((30, 40), 200.0), ((40, 50), 0.0)):
         assert (power[inside(a, b)] == want).all()
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.016])
+def test_positions_alone_are_taken_as_from_rest_to_rest(tmp_path: Path, dt: float) -> None:
+    """Differences over the first period, up to 4 % of the fastest here, are no speed at its start."""
+    machine = load_machine("mill").model_copy(update={"dt": dt})
+    made = StopMethod().plan(parse_program("G21 F60\nG1 X1\nY1\n"), machine).trajectory
+    assert made is not None
+    columns = np.column_stack([made.t, made.position])
+    file = tmp_path / "played.csv"
+    np.savetxt(file, columns, "%.9f", ",", header=",".join(["t", *made.axes]), comments="")
+    found = read_trajectory(file).trajectory
+    assert found.from_rest_to_rest
+    assert np.abs(found.velocity[0]).max() > 1e-6
+    write_table(tmp_path, found, Table())
+    write_pulses(tmp_path / "pulses.csv", pulses_of(found, {"x": 400.0, "y": 400.0}), {})

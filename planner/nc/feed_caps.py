@@ -12,7 +12,6 @@ Feeds are in the program's units, mm or inches per minute. Where rows overlap th
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -90,19 +89,23 @@ def _values(row: str, names: tuple[str, ...], source: str, line: int) -> tuple[s
     file, column = "", 1
     values: list[float] = []
     for name, text in zip(names, fields, strict=True):
-        word, value = text.strip().strip('"'), math.nan
-        with suppress(ValueError):
-            value = float(word)
+        word = text.strip().strip('"')
+        try:
+            value = float(word) if name != FILE else math.nan
+        except ValueError:
+            value = math.nan
         least = values[-1] if name == TO else 0.0
-        good, allowed = {
-            FILE: (bool(word), "the name of the program or of a file that it calls"),
-            LINE: (value % 1.0 == 0.0 and 1.0 <= value <= _LINE_MAX, "a line number, 1 or more"),
-            FROM: (0.0 <= value < math.inf, "a length in mm, 0 or more"),
-            TO: (least < value < math.inf, f"a length in mm, above {least:g}"),
-            FEED: (0.0 < value < math.inf, "a feed in the program's mm/min or inch/min, above 0"),
-        }[name]
-        if not good:
-            what = f"{name} is '{word[:40]}'; it must be {allowed}"
+        if name == FILE:  # what is wrong is written out only then: files have a row for each block
+            wrong = "" if word else "the name of the program or of a file that it calls"
+        elif name == LINE:
+            wrong = "" if value % 1.0 == 0.0 and 1.0 <= value <= _LINE_MAX else "a line number, 1 or more"
+        elif name == FROM:
+            wrong = "" if least <= value < math.inf else "a length in mm, 0 or more"
+        else:
+            unit = "length in mm" if name == TO else "feed in the program's mm/min or inch/min"
+            wrong = "" if least < value < math.inf else f"a {unit}, above {least:g}"
+        if wrong:
+            what = f"{name} is '{word[:40]}'; it must be {wrong}"
             raise InputError(what, source=source, line=line, column=column)
         if name == FILE:
             file = word

@@ -184,7 +184,6 @@ class _Removal:
         start, leg = inside[0]
         if self.out * (start.imag - above) > SAME:
             start = complex(_crossing(start, leg, above), above)
-
         return [Leg(start), *(leg for _, leg in inside)]
 
 

@@ -8,12 +8,9 @@
 Controls may begin a row at its other end, if that is nearer; here it begins at its first hole.
 """
 
-import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 from planner.nc.language import tree
-from planner.nc.language.making import Making, Row
 from planner.nc.language.siemens.text import variable
 
 PATTERNS = {
@@ -22,7 +19,7 @@ PATTERNS = {
     "CYCLE801": ("SPCA", "SPCO", "STA", "DIS1", "DIS2", "NUM1", "NUM2", "VARI"),
     "CYCLE802": ("XA", "YA", *(f"{axis}{k}" for k in range(9) for axis in "XY")),
 }
-_WANTED = tree.Named("_wanted", True)  # 1 where the hole is to be drilled
+_TURN = tree.Number(360.0)  # [degrees]
 
 
 def pattern_rows(
@@ -39,35 +36,44 @@ def pattern_rows(
     missing = [key for key in PATTERNS[name] if key not in known and key not in ("INDA", "VARI")]
     if missing:
         raise ValueError(f"{name} needs {missing[0]}")
-    n, on_grid = variable("_hole"), name == "CYCLE801"
-    count = known["NUM1"] * known["NUM2"] if on_grid else known["NUM"]
-    hole: list[tree.Statement] = [tree.made(place, partial(_to_hole, name=name), n=n, **known), *drilled]
-    if on_grid:
-        hole[1:] = [tree.If(place, ((_WANTED, list(drilled)),), [])]
-    turn: list[tree.Statement] = [*hole, tree.assign(place, (n, n + tree.ONE))]
+    # statements, not a maker's rows: a maker executes what is pending at each hole
+    n, angle, radius, across = (variable(f"_{one}") for one in ("hole", "angle", "radius", "across"))
+    count = known.get("NUM", tree.ZERO)
+    aside: tree.Expression = tree.ZERO
+    if name == "HOLES1":
+        along, turned = known["FDIS"] + n * known["DBH"], known["STA1"]
+        first: Sequence[tree.Expression] = (known["SPCA"], known["SPCO"])
+    elif name == "HOLES2":
+        step = known.get("INDA", tree.ZERO)
+        even = tree.op("EQ", step, tree.ZERO)  # 1 where the holes are spread evenly
+        along, turned = known["RAD"], known["STA1"] + n * (step + even * (_TURN / known["NUM"]))
+        first = (known["CPA"], known["CPO"])
+    else:
+        columns, lines = known["NUM1"], known["NUM2"]
+        column = tree.op("TRUNC", n / lines)
+        line = n - lines * column
+        along, turned, aside = column * known["DIS1"], known["STA"], line * known["DIS2"]
+        first, count = (known["SPCA"], known["SPCO"]), columns * lines
+        edge = [
+            tree.op("EQ", one, last)
+            for one in (column, line)
+            for last in (tree.ZERO, (columns if one is column else lines) - tree.ONE)
+        ]
+        on_frame = tree.op("OR", tree.op("OR", edge[0], edge[1]), tree.op("OR", edge[2], edge[3]))
+        grid = tree.op("EQ", known.get("VARI", tree.ZERO), tree.ZERO)
+        wanted = tree.op("OR", grid, on_frame)
+    sine, cosine = tree.op("SIN", angle), tree.op("COS", angle)
+    x, y = first[0] + radius * cosine - across * sine, first[1] + radius * sine + across * cosine
+    hole: list[tree.Statement] = [tree.row(place, ("G", tree.ZERO), ("X", x), ("Y", y)), *drilled]
+    if name == "CYCLE801":
+        hole = [tree.If(place, ((wanted, hole),), [])]
+    turn: list[tree.Statement] = [
+        tree.assign(place, (angle, turned), (radius, along), (across, aside)),
+        *hole,
+        tree.assign(place, (n, n + tree.ONE)),
+    ]
     loop = tree.Loop(place, "while", f"{name} {place.at}", tree.op("LT", n, count), turn)
     return [tree.assign(place, (n, tree.ZERO)), loop]
-
-
-def _to_hole(making: Making, given: Mapping[str, float], *, name: str) -> list[Row]:
-    """The move to hole n; of a grid's frame only those that lie on it are wanted."""
-    n, step, across, wanted = given["n"], given.get("INDA", 0.0), 0.0, True
-    if name == "HOLES1":
-        (x, y), along, angle = (given["SPCA"], given["SPCO"]), given["FDIS"] + n * given["DBH"], given["STA1"]
-    elif name == "HOLES2":
-        (x, y), along = (given["CPA"], given["CPO"]), given["RAD"]
-        angle = given["STA1"] + n * (step or 360.0 / given["NUM"])
-    else:
-        columns, lines = given["NUM1"], given["NUM2"]
-        column = float(math.trunc(n / lines))
-        line = n - lines * column
-        wanted = given.get("VARI", 0.0) == 0.0 or column in (0.0, columns - 1.0) or line in (0.0, lines - 1.0)
-        (x, y), along, angle = (given["SPCA"], given["SPCO"]), column * given["DIS1"], given["STA"]
-        across = line * given["DIS2"]
-    making.shared[_WANTED.name] = float(wanted)
-    sine, cosine = math.sin(math.radians(angle)), math.cos(math.radians(angle))
-    place = ("X", x + along * cosine - across * sine), ("Y", y + along * sine + across * cosine)
-    return [[("G", 0.0), *place]] if wanted else []
 
 
 def _at_places(

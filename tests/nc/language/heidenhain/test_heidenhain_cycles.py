@@ -198,6 +198,8 @@ def test_patterns_of_places() -> None:
     assert lines.end[-1, [0, 2]].tolist() == pytest.approx([-1, 30])
     with pytest.raises(InputError, match="Q365 1"):
         read(drill, "CYCL DEF 220 C Q216=0 Q365=1")
+    with pytest.raises(InputError, match="a number of places, not inf"):
+        read(drill, f"Q1 = {'9' * 300} * {'9' * 300}\nCYCL DEF 220 C Q216=0 Q241=Q1")
 
 
 def test_called_programs(tmp_path: Path) -> None:

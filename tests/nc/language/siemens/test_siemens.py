@@ -302,6 +302,12 @@ def test_patterns_of_holes() -> None:
     for text, said in (
         ("HOLES1(1,2,3,4,5,6)", "stands behind MCALL"),
         ("MCALL CYCLE81(5,0,2,-3)\nHOLES2(1,2,,0)", "needs RAD"),
+        ("MCALL CYCLE81(5,0,2,-3)\nR1=1EX308\nHOLES1(R1*10,2,3,4,5,6)", "the computed X word is infinite"),
+        ("MCALL CYCLE81(5,0,2,-3)\nR1=1EX308\nHOLES2(1,R1*10,3,4,5,6)", "the computed Y word is infinite"),
+        (
+            "MCALL CYCLE81(5,0,2,-3)\nR1=1EX308\nCYCLE801(1,2,3,R1*10,5,2,3,0)",
+            "the computed X word is infinite",
+        ),
     ):
         with pytest.raises(InputError, match=said):
             read(f"G0 X0\n{text}\nM30")

@@ -39,8 +39,8 @@ PECKS = ("G74", "G75")
 # Codes behind which a cut is not repeated: other motions and cycles.
 _MOTIONS = {f"G{n}" for n in (0, 1, 2, 3, 32, 33, 34, *range(70, 77), *range(80, 90), 184)}
 _LINES_AND_ARCS = {"G0", "G1", "G2", "G3"}
-# Codes whose coordinates are their own.
-_OWN_COORDINATES = {"G4", "G10", "G28", "G30", "G50", "G53"}
+# Codes whose words are their own.
+_OWN_WORDS = {"G4", "G10", "G12", "G13", "G28", "G30", "G50", "G53", "G65", "G66"}
 _PLACE = "XZUW"
 
 
@@ -89,7 +89,7 @@ class LatheWords(FanucParser):
             return
         if codes & (_LINES_AND_ARCS | {"G32"}):
             self.feeding = "G1" in codes
-        if self.feeding and not codes & _OWN_COORDINATES:
+        if self.feeding and not codes & _OWN_WORDS:
             words = self._corner_words(words)
         cycle = next((code for code in CYCLES if code in codes), "")
         if cycle:
@@ -127,7 +127,7 @@ class LatheWords(FanucParser):
         if codes & (_MOTIONS - DRILLS.keys()):
             self.drill = ""
         drill, places = named or self.drill, {word.letter for word in words} & set(_PLACE)
-        if not named and (not drill or codes & _OWN_COORDINATES or not places):
+        if not named and (not drill or codes & _OWN_WORDS or not places):
             return False
         own = {word.letter: word for word in words if word.letter in _PLACE + "RQPKL"}
         self._rest(tuple(word for word in words if word.code != named), set(own), line)
@@ -230,7 +230,7 @@ class LatheWords(FanucParser):
             raise line.fault("G92 with X and Z needs the lead of its thread as an F word on its line")
         if named:
             self.cut, self.cut_given = named, set()
-        elif not self.cut or not letters & set(_PLACE) or codes & _OWN_COORDINATES:
+        elif not self.cut or not letters & set(_PLACE) or codes & _OWN_WORDS:
             return False
         self._cutting(words, line)
         return True

@@ -272,3 +272,14 @@ def test_an_axis_of_the_machine_is_no_increment_of_a_lathe() -> None:
     )
     with pytest.raises(InputError, match="G95"):
         read(text, MACHINE)
+
+
+def test_words_of_a_call_are_no_corners() -> None:
+    """I, K and C behind G65 and G66 are arguments, while G1 is on, too."""
+    called = "G98 G0 X40 Z2\nX10 Z0\nG1 X12 F80\nG65 P9000 I14. C2. K-3.\nM30\nO9000\nG1 X#4 Z[#6-#3]\nM99"
+    same(read("O1\n" + called), written("G0 X10 Z0\nG1 X12 F80\nX14 Z-5\n"))
+
+
+def test_a_pocket_of_mills_is_refused_on_a_lathe() -> None:
+    with pytest.raises(InputError, match="G13 needs G17, its depth as Z and a radius as I"):
+        read("O1\nG98 G0 X10 Z0\nG1 X12 F80\nG13 I1. Z-1. D1\nG99\nM30")

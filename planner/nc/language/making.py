@@ -6,6 +6,7 @@ Also sentences that are said first (`assumed_row`), and holes of several dialect
 as upper limit, with a full stop where the spindle turns round, pecking with decreasing infeeds, milled bores.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -69,6 +70,11 @@ class Making:
     def take(self, rows: Iterable[Row] | None) -> None:
         """Rows to execute, all of them at the end, or where their maker asks for it by `flush`."""
         for row in rows or ():
+            for letter, value in row:
+                if not math.isfinite(value):
+                    raise ValueError(
+                        f"the computed {letter} word is {'infinite' if math.isinf(value) else 'no number'}"
+                    )
             words = [(ord(letter), value, self.place.at) for letter, value in row]
             self._rows.append(TravelRow(words, self.place.line, self.frame))
         self.flush()

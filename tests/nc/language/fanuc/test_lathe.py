@@ -276,7 +276,7 @@ def test_an_axis_of_the_machine_is_no_increment_of_a_lathe() -> None:
 
 def test_words_of_a_call_are_no_corners() -> None:
     """I, K and C behind G65 and G66 are arguments, while G1 is on, too."""
-    called = "G98 G0 X40 Z2\nX10 Z0\nG1 X12 F80\nG65 P9000 I14. C2. K-3.\nM30\nO9000\nG1 X#4 Z[#6-#3]\nM99"
+    called = "G98 G0 X40 Z2\nX10 W-2\nG1 X12 F80\nG65 P9000 I14. C2. K-3.\nM30\nO9000\nG1 X#4 Z[#6-#3]\nM99"
     same(read("O1\n" + called), written("G0 X10 Z0\nG1 X12 F80\nX14 Z-5\n"))
 
 

@@ -2,8 +2,8 @@
 of their cubics.
 
 Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed
-has degree 4: it is looked at in `PLACES` places and, from the highest of them, where its derivative 2 v.a is
-zero (Newton). The normal acceleration is looked at in the same places. For the tolerance see nlp.py: control
+has degree 4: where its Bernstein coefficients are not all within the limit it is looked at in `PLACES` places and, from the
+highest of them, where its derivative 2 v.a is zero (Newton). The normal acceleration is looked at in the same places. For the tolerance see nlp.py: control
 points within the budget of those of the leg's own cubic, along places that never go back (legs.py). On arcs a
 step is looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
 """
@@ -53,8 +53,20 @@ def _at(v, a, j, t):
 
 
 @njit(cache=True, error_model="numpy")
+def _fastest(h, v, a, j):
+    """No speed in a step is above that: the root of the largest Bernstein coefficient of its square."""
+    first, second, third, fourth, last = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(len(v)):
+        middle, end = v[k] + 0.5 * h * a[k], v[k] + h * (a[k] + 0.5 * h * j[k])
+        first, second = first + v[k] * v[k], second + v[k] * middle
+        third += (2.0 * middle * middle + v[k] * end) / 3.0
+        fourth, last = fourth + middle * end, last + end * end
+    return np.sqrt(max(first, second, third, fourth, last))
+
+
+@njit(cache=True, error_model="numpy")
 def _of_limits(keeps, r, h, v, a, j):
-    """The largest share of a limit in a step on leg r."""
+    """The largest share of a limit in a step on leg r; of the feed a bound of it where that is at most 1."""
     worst, axes = 0.0, len(v)
     for k in range(axes):
         worst = max(worst, abs(j[k]) / keeps.jerk[k])
@@ -63,6 +75,9 @@ def _of_limits(keeps, r, h, v, a, j):
         turn = turn if 0.0 < turn < h else 0.0
         fastest = max(abs(v[k]), abs(v[k] + h * (a[k] + 0.5 * h * j[k])), abs(v[k] + 0.5 * turn * a[k]))
         worst = max(worst, fastest / keeps.velocity[k])
+    bound = _fastest(h, v, a, j) / keeps.feed[r]
+    if bound <= 1.0 and keeps.normal[r] == np.inf:
+        return max(worst, bound)
     best, at = 0.0, 0.0
     for n in range(PLACES):
         t = h * n / (PLACES - 1)
@@ -166,14 +181,12 @@ def _of_arc(keeps, r, c, s0, end, known, budgets, work):
 
 
 @njit(cache=True, error_model="numpy")
-def _of_line(keeps, r, c, places, end, budgets, work):
+def _of_line(keeps, r, c, places, end, budgets):
     """The same on a line, of control points with the places (3,) and `end` on it."""
-    point, tangent, bend = work[0], work[2], work[4]
-    worst = 0.0
+    worst, base, drift = 0.0, keeps.legs.base[r], keeps.legs.drift[r]
     for m in range(4):
-        formula_point(keeps.legs, r, end if m == 3 else places[m], point, tangent, bend)
         budget = budgets[m // 3] if m % 3 == 0 else keeps.budget[r]
-        worst = max(worst, _apart(c[m], point, tangent, 0.0) / budget)
+        worst = max(worst, _apart(c[m], base, drift, end if m == 3 else places[m]) / budget)
     return worst
 
 
@@ -281,5 +294,5 @@ def _put_tube(keeps, leg, h, x, place, less, tube):
             share, before = _of_arc(keeps, r, c, before, end, ends, budgets, work)
         else:
             end = keeps.legs.length[r] if ends else last if i == N - 1 else on_line[i + 1, 0]
-            share = _of_line(keeps, r, c, on_line[i], end, budgets, work)
+            share = _of_line(keeps, r, c, on_line[i], end, budgets)
         tube[i] = share

@@ -2,10 +2,11 @@
 of their cubics.
 
 Jerk is constant on a step, acceleration linear and the velocity of an axis a parabola. The square of the feed
-has degree 4: where its Bernstein coefficients are not all within the limit it is looked at in `PLACES` places and, from the
-highest of them, where its derivative 2 v.a is zero (Newton). The normal acceleration is looked at in the same places. For the tolerance see nlp.py: control
-points within the budget of those of the leg's own cubic, along places that never go back (legs.py). On arcs a
-step is looked at in `PIECES`, and what the arc is off its own cubic (run.py) counts too.
+has degree 4: where its Bernstein coefficients are not all within the limit it is looked at in `PLACES` places
+and, from the highest of them, where its derivative 2 v.a is zero (Newton). The normal acceleration is looked at
+in the same places. For the tolerance see nlp.py: control points within the budget of those of the leg's own
+cubic, along places that never go back (legs.py). On arcs a step is looked at in `PIECES`, and what the arc is
+off its own cubic (run.py) counts too.
 """
 
 from typing import NamedTuple

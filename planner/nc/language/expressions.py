@@ -9,6 +9,8 @@ from planner.nc.language import tree
 
 _SIGNS = {"EQ": "==", "NE": "!=", "GT": ">", "GE": ">=", "LT": "<", "LE": "<="}
 COMPARISONS = frozenset(_SIGNS)
+# Of finite numbers these may make one that is not: a computed value of none would count as a word without value.
+GROWING = frozenset(("+", "-", "*", "/", "POT", "LEN"))
 LOGICAL = frozenset(("AND", "OR", "XOR", "NOT"))
 # By name and number of operands. A dialect that means another thing by a name puts its own text in the place
 # of this one.
@@ -45,6 +47,13 @@ ARITHMETIC: dict[tuple[str, int], str] = {
 }
 
 
+def finite(x: float) -> float:
+    """The same. Raises OverflowError if it is not finite."""
+    if x - x != 0.0:
+        raise OverflowError
+    return x
+
+
 def modulo(a: float, b: float) -> float:
     """a MOD b, never negative. Raises ZeroDivisionError."""
     if b == 0.0:
@@ -69,7 +78,7 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
     "array_index": array_index,
     "remainder": math.remainder,
     **{f.__name__: f for f in (math.exp, math.log, math.log10, math.sqrt, math.hypot, math.trunc, math.fmod)},
-    **{f.__name__: f for f in (math.ceil, math.floor, math.copysign, modulo, rounded)},
+    **{f.__name__: f for f in (math.ceil, math.floor, math.copysign, finite, modulo, rounded)},
     "power": math.pow,
     "sin": lambda x: math.sin(math.radians(x)),
     "cos": lambda x: math.cos(math.radians(x)),
@@ -137,12 +146,12 @@ class Expressions:
 
     def value(self, expression: tree.Expression) -> str:
         """Python text of a number. Raises OverflowError for a number that is too large."""
-        text, logical = self._expression(expression, raw=False)
+        text, logical = self._checked(expression, raw=False)
         return f"(1.0 if {text} else 0.0)" if logical else text
 
     def condition(self, expression: tree.Expression) -> str:
         """Python text of what is true or false."""
-        text, logical = self._expression(expression, raw=False)
+        text, logical = self._checked(expression, raw=False)
         return text if logical else f"{text}!=0"
 
     def assigned(self, expression: tree.Expression) -> str:
@@ -155,6 +164,12 @@ class Expressions:
         """True if a parameter of that number is the program's own, not one that the control is asked for."""
         low, language = 0 if self.language.vacant is None else 1, self.language
         return low <= index <= language.largest and index % 1 == 0 and index not in language.system_numbers
+
+    def _checked(self, expression: tree.Expression, *, raw: bool) -> tuple[str, bool]:
+        """As `_expression`; the text raises OverflowError where the value is not finite."""
+        text, logical = self._expression(expression, raw=raw)
+        grows = isinstance(expression, tree.Operation) and expression.name in GROWING
+        return f"finite({text})" if grows else text, logical
 
     def _expression(self, expression: tree.Expression, *, raw: bool) -> tuple[str, bool]:
         """Python text, and whether it is true or false rather than a number."""
@@ -186,8 +201,11 @@ class Expressions:
             return f"({parameter.name!r} in {'G' if parameter.shared else 'L'})", True
         raw = expression.name in language.raw
         operands = []
-        for operand in expression.operands:
-            text, logical = self._expression(operand, raw=raw and isinstance(operand, tree.Numbered))
+        for k, operand in enumerate(expression.operands):
+            # what is not finite stays so in the next of them, but as a divisor
+            passes = expression.name in GROWING and not (expression.name == "/" and k)
+            say = self._expression if passes else self._checked
+            text, logical = say(operand, raw=raw and isinstance(operand, tree.Numbered))
             operands.append(f"(1.0 if {text} else 0.0)" if logical else text)
         template = language.operations[expression.name, len(operands)]
         return template.format(*operands), expression.name in language.conditions

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.nc.language.tree import ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 
 RowWord = tuple[int, int, float | None]  # letter code, place, value
@@ -79,8 +78,8 @@ class AppendedRows:
             self.frames.append((len(self.pending), frame))
 
     def take(self) -> Words:
-        """All pending rows as words, which are then no longer pending. A computed value of NaN was vacant:
-        its word is left out. Raises NotFinite if a computed value is infinite."""
+        """All pending rows as words, which are then no longer pending. A computed value of None, here NaN, was
+        vacant: its word is left out."""
         tables = self._tables_now()
         entries = np.array(self.pending, dtype=np.int64)
         at_entry, frame = np.array(self.frames, dtype=np.int64).T
@@ -94,12 +93,6 @@ class AppendedRows:
         self.values.clear()
         self.frames[:] = self.frames[-1:]
         self.frames[0] = (0, self.frames[0][1])
-        if len(infinite := np.flatnonzero(np.isinf(value))):
-            word = int(infinite[0])
-            line = int(tables.line[rows[np.searchsorted(np.cumsum(length), word, side="right")]])
-            file = sum(begin <= at[word] for begin, _ in self.files)
-            text = f"the computed {chr(letter[word])} word is infinite"
-            raise NotFinite(SourcePlace(file, line, int(at[word])), text)
         has_value = ~np.isnan(value)
         if not has_value.all():
             length = np.add.reduceat(np.append(has_value, False), np.cumsum(length) - length) * (length > 0)
@@ -138,10 +131,6 @@ class AppendedRows:
             first = np.concatenate([[0], np.cumsum(count)])
             self._tables = _Tables(letter, value, at, computed, line, first, begin, end)
         return self._tables
-
-
-class NotFinite(ProgramFault):
-    """A computed word is infinite."""
 
 
 def _ranges(first: Array, last: Array) -> tuple[Array, Array]:

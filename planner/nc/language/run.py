@@ -18,7 +18,7 @@ from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.compiled import Compiled, endless, last_statement, sentence, statement_of, whole
 from planner.nc.language.making import Maker, Making
-from planner.nc.language.rows import AppendedRows, NotFinite
+from planner.nc.language.rows import AppendedRows
 from planner.nc.language.source import Source
 from planner.nc.language.system_variables import Modes, SystemVariables
 from planner.nc.language.travel import Travel
@@ -113,8 +113,6 @@ class ProgramRun:
                 self._execute(words_of(left, self.rows.data, tuple(self.rows.files)))
         except Ended:
             return None
-        except NotFinite as fault:
-            return fault
         except ProgramFault as fault:
             return self._stopped(fault)
         except (ArithmeticError, ValueError, KeyError) as fault:

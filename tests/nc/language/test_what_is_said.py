@@ -135,6 +135,26 @@ def test_more_digits_than_there_are_numbers_for_are_refused_with_their_line(text
         parse_program(text.format("1" * 400), MACHINE)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G21 G90 F600\n#1=[10**200]\n#2=[#1*#1]\nG1 X1\nM2\n",
+        "G21 G90 F600\n#1=[10**200]\nG1 X[#1*#1-#1*#1] Y1\nM2\n",
+        "G21 G90 F600\n#1=[10**200]\nG1 X[1/[#1*#1]]\nM2\n",
+        "G21 G90 F600\n#1=[10**200]\no1 if [[#1*#1] gt 0]\nG1 X1\no1 endif\nM2\n",
+        "O1\nG21 G90 F600\n#1=1.\nWHILE[#3LT40]DO1\n#1=#1*10000000000.\n#3=#3+1\nEND1\nG1 X[#1-#1] Y1.\nM30\n",
+        "O1\nG21 G90 F600\n#1=100000000.\n#2=#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1*#1\n"
+        "#3=#2*#2\nM30\n",
+        "R1=1EX300\nG1 G90 F600\nG1 X=R1*R1*0 Y1\nM30\n",
+        "0 BEGIN PGM A MM\nQ1 = +10\nQ2 = Q1 * Q1\nLBL 1\nQ2 = Q2 * Q2\nCALL LBL 1 REP 9\n9 END PGM A MM\n",
+    ],
+)
+def test_results_that_are_no_finite_numbers_are_refused_where_they_are_made(text: str) -> None:
+    """LinuxCNC refuses them; an infinite number less itself would be a word left out, and one over it nothing."""
+    with pytest.raises(InputError, match=r":\d+:\d+: .*: the result is too large"):
+        parse_program(text, MACHINE)
+
+
 @pytest.mark.parametrize("number", [0, -1, 5602, 6000])
 def test_a_computed_parameter_that_there_is_not_is_refused(number: int) -> None:
     text = f"G21 G90 F600\n#1={number}\n#[#1]=2\nG1 X1\nM2\n"

@@ -293,9 +293,7 @@ def _pattern(
     given, second = parameters(making), making.numbered[204 + 1]
     if given["Q301"] == 0.0:
         making.numbered[204 + 1] = 0.0
-    if not math.isfinite(holes := count(given)):
-        raise ValueError(f"a pattern has a number of places, not {holes:g}")
-    for n in range(math.ceil(holes)):
+    for n in range(math.ceil(count(given))):
         at = place(given, n)
         making.shared["_x"], making.shared["_y"] = at.real, at.imag
         yield [("G", 0.0), ("X", at.real), ("Y", at.imag)]

@@ -198,8 +198,8 @@ def test_patterns_of_places() -> None:
     assert lines.end[-1, [0, 2]].tolist() == pytest.approx([-1, 30])
     with pytest.raises(InputError, match="Q365 1"):
         read(drill, "CYCL DEF 220 C Q216=0 Q365=1")
-    with pytest.raises(InputError, match="a number of places, not inf"):
-        read(drill, f"Q1 = {'9' * 300} * {'9' * 300}\nCYCL DEF 220 C Q216=0 Q241=Q1")
+    with pytest.raises(InputError, match="the result is too large"):
+        read(drill, f"CYCL DEF 221 C Q225=0 Q242={'9' * 300} Q243={'9' * 300}")
 
 
 def test_called_programs(tmp_path: Path) -> None:

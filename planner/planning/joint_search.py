@@ -111,11 +111,8 @@ def joint_plan(
         runs = list(tube_runs_of(job.toolpath, job.machine, jerk_limited=settings.order.jerk_limited))
         start = Start(motion or between_leads(planned.motion(), job, led), job, runs, search.cut)
         steps = sum(map(len, start.guesses))
-        most = search.steps_max
-        if steps > search.small:  # no finer than what is delivered
-            most = min(most, start.motion.end / job.machine.dt)
-        if steps > most:
-            job.tell("search", steps=steps, of=most)
+        if steps > search.steps_max:
+            job.tell("search", steps=steps, of=search.steps_max)
             return Joint(None, steps)
         found = searched_runs(runs, start, search.of(steps), report, stays=stays)
     made, looked = None, found

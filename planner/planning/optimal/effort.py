@@ -50,8 +50,7 @@ class Search:
     finer: tuple[tuple[Cut, float], ...] = ((SECOND_CUT, SECOND_GAP),)
     smooth: float = 0.0  # weight of the jerk against the time at least [-]
     again: bool = True  # search once more where that has not ended
-    # steps of the motions that `finer` and `again` are meant for; longer ones are searched where a step is
-    # at least a period on the mean, and once only
+    # steps of the motions that `finer` and `again` are meant for; longer ones are searched once only
     small: float = float("inf")
 
     def of(self, steps: int) -> Search:

@@ -141,9 +141,8 @@ def test_a_dwell_at_the_end_is_stood_through():
 
 
 @pytest.mark.usual_sizes
-def test_large_motions_are_searched_where_their_steps_are_no_finer_than_what_is_delivered(monkeypatch):
-    """A zig-zag counts as large: it is searched in long steps, twice, and not at all with an interpolation period longer than
-    them."""
+def test_large_motions_are_searched_in_long_steps_also_where_these_are_finer_than_what_is_delivered(monkeypatch):
+    """A zig-zag counts as large. 20,000 blocks of some um take 1.6 % less time for it (benchmarks/cost/long_jobs.py)."""
     job = problems.zigzag(4)
     fine = planner.plan(job, MACHINE)
     monkeypatch.setitem(
@@ -153,8 +152,9 @@ def test_large_motions_are_searched_where_their_steps_are_no_finer_than_what_is_
     assert "together" in long.sentence
     assert fine.cycle_time < long.cycle_time < quick.cycle_time
     assert long.grid_points < 1.5 * quick.grid_points < fine.grid_points
-    coarse = planner.plan(job, MACHINE.model_copy(update={"dt": 0.05}))
-    assert "together" not in coarse.sentence
+    coarse = planner.plan(job, MACHINE.model_copy(update={"dt": 0.008}))
+    assert coarse.cycle_time < 0.008 * coarse.grid_points
+    assert "together" in coarse.sentence
 
 
 def test_behind_filters_the_order_of_the_path_tells_a_corner_from_the_end_of_a_circle():

@@ -20,6 +20,9 @@ from planner.planning.optimal.order import Order
 
 # Interpolation error of the axis accelerations on the coarsest grid [share of the limit].
 COARSE = 3.2e-2
+# The same of the motion that a search begins with: from a grid twelve times as fine it finds the same times, to 1e-5 on the
+# mean of 70 jobs, and 169,208 short blocks take a third more computing for it.
+BEGINNING = 0.1
 
 
 # The first steps of a search, those of the second one, and the gaps of both [-].

@@ -14,7 +14,7 @@ and then, delivered as a plan,
 import dataclasses
 
 from planner.base.errors import NotSolvedError
-from planner.base.names import AUTO, QUICK, SPLINE
+from planner.base.names import AUTO, SPLINE
 from planner.corners.smooth import SmoothPath, round_corners
 from planner.feedrate.sampling.samples import sample_path
 from planner.feedrate.solution import Status
@@ -28,7 +28,7 @@ from planner.planning.job.plan import NO_TABLES, Delivered, Plan, Tables
 from planner.planning.job.trace import Tell, tell_nobody
 from planner.planning.optimal.behind_filters import within_filters
 from planner.planning.optimal.compare_corners import corner_bounds, with_corners
-from planner.planning.optimal.effort import COARSE, EFFORTS, Grids, Settings
+from planner.planning.optimal.effort import BEGINNING, COARSE, Grids, Settings
 from planner.planning.optimal.geometry import Laid, corner_shape, splined_with_stops, tell_splines
 from planner.planning.optimal.notes import no_spline_note, not_compared_note, path_notes
 from planner.planning.optimal.on_path import OnPath
@@ -126,7 +126,7 @@ def first_motion(job: Job, settings: Settings) -> OnPath | None:
     if (len(fits) and not fits.any()) or shape.splines.span_first[-1] > settings.effort.search.steps_max:
         return None
     try:
-        planned = settings.order.solve(with_spline(rounded, shape), job, EFFORTS[QUICK].sizes[-1].final)
+        planned = settings.order.solve(with_spline(rounded, shape), job, BEGINNING)
     except NotSolvedError:  # no grid follows the splines
         return None
     if not planned.solution.solved:

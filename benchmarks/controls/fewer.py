@@ -4,8 +4,9 @@
 
 Programs are those of ../shared/nc that the machine peers.toml (100 mm/s and 2000 mm/s2 per axis) can run and that have at
 least 500 straight moves at a feed; those that compute are written out first. Each is written with fewer lines within half of
-20 um and half of 50 um, read back and compared. Times are those of `planner time` for grbl and LinuxCNC, of the program
-within half the tolerance and of the written one within the same: predictions, 2.6 ms a line at grbl's serial port included.
+20 um, half of 50 um and all of 50 um, read back and compared. Times are those of `planner time` for grbl and LinuxCNC, of the
+program within half the tolerance and of the written one within the same: predictions, 2.6 ms a line at grbl's serial port
+included. Where all of the tolerance is used none is left for the control, and no time is told.
 """
 
 from __future__ import annotations
@@ -30,13 +31,17 @@ from planner.nc.reader import parse_program
 from planner.nc.reading import AS_USUAL
 
 SHARED = Path(os.environ.get("PLANNER_SHARED", ROOT.parent / "shared"))
-TOLERANCES = (0.02, 0.05)  # [mm]
+ROOMS = (
+    (0.02, SHARE),
+    (0.05, SHARE),
+    (0.05, 1.0),
+)  # tolerances [mm], and the shares of them that are used [-]
 MOVES_MIN = 500
 TIMED = ("grbl", "linuxcnc")
 
 
 def rows_of(file: Path, machine: Machine) -> list[dict[str, Any]]:
-    """The rows of a program, one for each tolerance. Raises InputError for one that cannot be read or written anew."""
+    """The rows of a program, one for each of `ROOMS`. Raises InputError for one that cannot be read or written anew."""
     data = file.read_bytes()
     expanded = flat_program(data, machine, AS_USUAL, source=file.name)
     if expanded is not None:
@@ -45,9 +50,13 @@ def rows_of(file: Path, machine: Machine) -> list[dict[str, Any]]:
     if np.count_nonzero(program.kind == Kind.LINE) < MOVES_MIN:
         return []
     rows = []
-    for tolerance in TOLERANCES:
-        allowed = SHARE * tolerance
-        row: dict[str, Any] = {"program": file.name.split("__")[-1], "tolerance_mm": tolerance}
+    for tolerance, share in ROOMS:
+        allowed = share * tolerance
+        row: dict[str, Any] = {
+            "program": file.name.split("__")[-1],
+            "tolerance_mm": tolerance,
+            "share": share,
+        }
         try:
             begin = time.process_time()
             made = fewer_lines(data, program, machine, ROOM * allowed)
@@ -61,7 +70,7 @@ def rows_of(file: Path, machine: Machine) -> list[dict[str, Any]]:
             continue
         row |= {"compare_s": time.process_time() - begin, "within_mm": found.within, "fault": found.fault}
         row |= {"before": made.before, "after": made.after, "arcs": made.arcs}
-        for name in TIMED:
+        for name in TIMED if share < 1.0 else ():
             for each, key in ((program, "before"), (again, "after")):
                 row[f"{name}_{key}_s"] = control_times(each, machine, name, allowed).seconds
         rows.append(row)
@@ -82,13 +91,22 @@ def main() -> None:
             rows += rows_of(file, machine)
         except InputError as fault:
             print(f"{file.name}: {fault.message}", flush=True)
-    columns = ["program", "tolerance [um]", "moves", "fewer", "change", "arcs", "certified within [um]"]
+    columns = [
+        "program",
+        "tolerance [um]",
+        "share",
+        "moves",
+        "fewer",
+        "change",
+        "arcs",
+        "certified within [um]",
+    ]
     columns += ["grbl [s]", "change", "LinuxCNC [s]", "change", "CPU [s]"]
     table = []
     for row in rows:
-        head = [row["program"], f"{1e3 * row['tolerance_mm']:.0f}"]
+        head = [row["program"], f"{1e3 * row['tolerance_mm']:.0f}", f"{row['share']:g}"]
         if "refused" in row:
-            table.append([*head, row["refused"], *[""] * (len(columns) - 3)])
+            table.append([*head, row["refused"], *[""] * (len(columns) - 4)])
             continue
         cells = [
             f"{row['before']:,}",
@@ -97,8 +115,8 @@ def main() -> None:
         ]
         cells += [f"{row['arcs']:,}", row["fault"] or f"{1e3 * row['within_mm']:.2f}"]
         for name in TIMED:
-            before, after = row[f"{name}_before_s"], row[f"{name}_after_s"]
-            cells += [f"{before:.1f}", f"{100 * (after / before - 1):+.1f} %"]
+            before, after = row.get(f"{name}_before_s"), row.get(f"{name}_after_s")
+            cells += [f"{before:.1f}", f"{100 * (after / before - 1):+.1f} %"] if before else ["", ""]
         table.append([*head, *cells, f"{row['fit_s'] + row['compare_s']:.1f}"])
     write_results("fewer-lines", {"rows": rows}, markdown(columns, table))
 

@@ -204,6 +204,12 @@ class Toolpath:
         return np.maximum(np.searchsorted(self.block, block, side="right") - 1, 0)
 
     @property
+    def same_tolerance(self) -> float | None:
+        """The contour tolerance if it is the same at every joint [mm]; None where the program changes it (G64 P)."""
+        tolerance = self.tolerance
+        return float(tolerance[0]) if (tolerance == tolerance[0]).all() else None
+
+    @property
     def velocities(self) -> FloatArray:
         """(2, A) at the first and the last joint [mm/s]."""
         tangents = np.stack([self.tangent_start[0], self.tangent_end[-1]])

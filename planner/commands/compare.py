@@ -12,16 +12,7 @@ from planner.base.names import METHODS, method_name
 from planner.commands import options
 from planner.commands.machine import machine_named
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import (
-    BAD_INPUT,
-    FAILED,
-    NOT_SOLVED,
-    guarded,
-    memory_used_up,
-    say,
-    say_json,
-    show,
-)
+from planner.commands.terminal import CODES, guarded, memory_used_up, say, say_json, show
 from planner.nc.reading import Reading
 
 if TYPE_CHECKING:
@@ -100,8 +91,7 @@ def compare_command(
         for file in files:
             say(str(file))
     outcomes = {row.outcome for row in rows}
-    closest = {"passed": 0, "failed": FAILED, "not solved": NOT_SOLVED, "refused": BAD_INPUT}
-    if code := next(code for outcome, code in closest.items() if outcome in outcomes):
+    if code := next(code for outcome, code in CODES.items() if outcome in outcomes):
         raise typer.Exit(code)
 
 

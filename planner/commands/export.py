@@ -120,14 +120,12 @@ def export_command(
             raise InputError(_NO_EXTRUDER, source=str(plan))
         machine = read.metadata.get("machine")
         between = machine.get("interpolation", "linear") if isinstance(machine, dict) else "linear"
-        if for_ is For.stream and between == "cubic":
+        if between == "cubic" and for_ in (For.stream, *STRAIGHT):
             raise InputError(_POSITIONS_ALONE, source=str(plan))
         if for_ is For.stream:
             write_stream(new, trajectory, unit)
             text = f"{len(trajectory):,} rows, one every {trajectory.dt * 1e3:g} ms; try them with: halrun -f try.hal"
         else:
-            if between == "cubic" and for_ in STRAIGHT:
-                raise InputError(_POSITIONS_ALONE, source=str(plan))
             table = Table(
                 kind=for_.value,
                 unit=unit.value,

@@ -20,16 +20,10 @@ from planner.base.files import STDIN
 from planner.base.threads import cores
 from planner.commands.interrupt import interrupts_raise
 from planner.commands.progress import ProgressBar
-from planner.commands.terminal import BAD_INPUT, BUG, FAILED, INTERRUPTED, NOT_SOLVED, say, say_json, show
+from planner.commands.terminal import BUG, CODES, INTERRUPTED, NOT_SOLVED, say, say_json, show
 
 # By the exit code of a program's process.
-OUTCOMES = {
-    0: "passed",
-    FAILED: "failed",
-    BAD_INPUT: "refused",
-    NOT_SOLVED: "not solved",
-    INTERRUPTED: "interrupted",
-}
+OUTCOMES = {code: outcome for outcome, code in CODES.items()} | {INTERRUPTED: "interrupted"}
 CHILD = "from planner.commands.many import end_with_the_first as begin; begin(); from planner.cli import main; main()"
 # Signals that no fault of a process raises: of a system whose memory is used up, of a batch system, of
 # `kill`.

@@ -48,8 +48,6 @@ def _studied_job(
     from planner.planning.methods.registry import check_settings
 
     check_settings(**how)
-    if tolerance is not None and not 0.0 < tolerance < float("inf"):
-        raise InputError(f"tolerance {tolerance} mm; it must be positive and finite")
     limits = machine_named(machine)
     program = read_program(job, limits, reading)
     return StudiedJob(program=program, machine=limits, tolerance=tolerance, how=how)

@@ -193,6 +193,8 @@ This is a bug in planner, not in your program. Please report it with the lines a
 FAILED = 1  # planned, but the verdict failed
 BAD_INPUT = 2
 NOT_SOLVED = 3  # or out of memory
+# By the outcome of a plan; of several plans the first one here that there is.
+CODES = {"passed": 0, "failed": FAILED, "not solved": NOT_SOLVED, "refused": BAD_INPUT}
 BUG = 70  # EX_SOFTWARE of sysexits.h
 INTERRUPTED = 130  # 128 + SIGINT, what shells report
 BROKEN_PIPE = 141  # 128 + SIGPIPE: the reader of the output has gone

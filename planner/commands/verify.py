@@ -57,7 +57,7 @@ def verify_command(
     """Judge a trajectory file, from any source, against its program and a machine."""
     from planner.nc.reader import read_program
     from planner.report.judging import FileSays, judge
-    from planner.report.summary import json_ready, uniform
+    from planner.report.summary import json_ready
     from planner.report.tables import assumed_lines, verdict_table
     from planner.report.trajectory_reader import FORMATS, read_trajectory, trajectory_file
     from planner.verifier import NOT_LIMITED_NAMES
@@ -86,7 +86,7 @@ def verify_command(
         about = {
             "corners": verdict.corners.summary(),
             "machine": limits.name,
-            "tolerance_mm": uniform(budgets),
+            "tolerance_mm": found.toolpath.same_tolerance,
             "cycle_time_s": time,
             "notes": notes,
         }

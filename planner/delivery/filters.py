@@ -132,7 +132,7 @@ class Behind:
     def _budget(self, block: Array, position: FloatArray) -> FloatArray:
         """Budget of the joints (g,) that are nearest to positions on blocks [mm]."""
         path = self.toolpath
-        segment = np.searchsorted(path.block, block, side="right") - 1
+        segment = path.segment_at(block)
         first = np.searchsorted(path.block, block)
         ends = np.stack([path.start[first], path.end[segment]])
         nearer = np.linalg.norm(ends - position, axis=2).argmin(axis=0)

@@ -30,7 +30,7 @@ from planner.geometry.toolpath import Arcs, Joint, Toolpath
 from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.bezier import homogeneous
-from planner.nc.program import MOVES, Kind, PathControl, Program
+from planner.nc.program import Kind, PathControl, Program
 
 # Turning angle below which two tangents are the same [rad]: coordinates of 1e3 mm have 1e-13 mm of rounding,
 # and at 1e-8 rad the velocity jumps by 1e-6 mm/s at 100 mm/s, below any drive's resolution.
@@ -67,7 +67,6 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
     _check_coordinates(program)
     position = np.vstack([program.start, program.end])
     chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    moves = np.isin(program.kind, MOVES)
     of_block = np.full(len(program), tolerance) if tolerance is not None else program.tolerance
     of_block = np.where(np.isnan(of_block), machine.tolerance, of_block)
     splines = _curves_of(program, of_block)
@@ -112,7 +111,6 @@ def toolpath_from_program(program: Program, machine: Machine, tolerance: float |
         dwell=dwell,
         held=np.isin(block, program.synchronised),
         exact=_exact(program, block, joint),
-        zero_length=np.flatnonzero(moves & ~real),
         radius=machine.radius,
         extrusion=extrusion,
     )

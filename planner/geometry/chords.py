@@ -138,7 +138,7 @@ def points_on(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:
 
 
 def polyline(toolpath: Toolpath, count: Array) -> tuple[FloatArray, Array]:
-    """The path as a polyline: its points (N, A) [mm] behind the start, and the segment (N,) of each.
+    """The path as a polyline: its points (N+1, A) [mm], the start first, and the segment (N,) of each behind it.
 
     count : (M,) points on every segment, evenly along it, the last at its end; 1 on lines
     """
@@ -148,7 +148,7 @@ def polyline(toolpath: Toolpath, count: Array) -> tuple[FloatArray, Array]:
     inner = np.flatnonzero(number < count[segment])
     at = segment[inner]
     points[inner] = points_on(toolpath, at, toolpath.length[at] * number[inner] / count[at])
-    return points, segment
+    return np.vstack([toolpath.start[:1], points]), segment
 
 
 def arc_point(toolpath: Toolpath, segment: Array, x: FloatArray) -> FloatArray:

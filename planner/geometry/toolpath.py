@@ -94,7 +94,6 @@ class Toolpath:
     dwell           : (M+1,) time to stand still at the joint [s], > 0 only where the joint is STOP
     held            : (M,) True where the feed is to be reached and held: threads (geometry/run_in.py)
     exact           : (M,) True where the path is followed exactly (G61, G61.1); no corner there is rounded
-    zero_length     : (Z,) blocks that move nowhere, kept as events
     radius          : rotary axes are in angles times this radius [mm], so that all axes are lengths
     extrusion       : what the extruder does along it; None without one
     speeds          : along the path at its first and its last joint [mm/s], with no acceleration: 0 for rest; the limits
@@ -125,7 +124,6 @@ class Toolpath:
     dwell: FloatArray
     held: Array
     exact: Array
-    zero_length: Array
     radius: float = 1.0
     extrusion: Extrusion | None = None
     speeds: tuple[float, float] = (0.0, 0.0)
@@ -141,7 +139,6 @@ class Toolpath:
         freeze(self, "line", np.int32, (segments,))
         freeze(self, "joint", np.uint8, (segments + 1,))
         freeze(self, "theta tolerance dwell", np.float64, (segments + 1,))
-        freeze(self, "zero_length", np.int64, (None,))
         if self.inside is not None:
             freeze(self, "inside", np.float64, (segments,))
         if segments and (self.joint[0] != Joint.STOP or self.joint[-1] != Joint.STOP):
@@ -202,6 +199,16 @@ class Toolpath:
         back = (self.joint == Joint.CORNER) & (self.theta > REVERSAL_ANGLE)
         return self.with_joints(back, Joint.STOP) if back.any() else self
 
+    def segment_at(self, block: Array) -> Array:
+        """(n,) the last segment of each block (n,); of blocks that are unknown or move nowhere one beside them."""
+        return np.maximum(np.searchsorted(self.block, block, side="right") - 1, 0)
+
+    @property
+    def same_tolerance(self) -> float | None:
+        """The contour tolerance if it is the same at every joint [mm]; None where the program changes it (G64 P)."""
+        tolerance = self.tolerance
+        return float(tolerance[0]) if (tolerance == tolerance[0]).all() else None
+
     @property
     def velocities(self) -> FloatArray:
         """(2, A) at the first and the last joint [mm/s]."""
@@ -222,7 +229,7 @@ class Toolpath:
         columns: dict[str, Any] = {}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, np.ndarray) and field.name != "zero_length":
+            if isinstance(value, np.ndarray):
                 sides = [(int(before), int(behind)), *[(0, 0)] * (value.ndim - 1)]
                 columns[field.name] = np.pad(value, sides, mode="edge")
         for k, joint in [(0, 1)] * before + [(-1, -2)] * behind:
@@ -248,7 +255,7 @@ class Toolpath:
         columns: dict[str, Any] = {}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, np.ndarray) and field.name != "zero_length":
+            if isinstance(value, np.ndarray):
                 columns[field.name] = value[kept if len(value) == len(self) else joints]
         # each segment has a row of its own in these, in order
         for row, table in (("arc", "arcs"), ("curve", "curves")):

@@ -197,7 +197,6 @@ class ControlData(Record):
 
 
 XYZAC, XYZBC, HEAD_TABLE, HEAD_HEAD = "xyzac-trt", "xyzbc-trt", "head-table", "head-head"
-TILTING = ("a", "b")  # letters of the axis that tilts; the other one is c
 # What each type has beside the point of rotation and the tool's length.
 _OFFSETS, _HEAD = ("x_offset", "y_offset", "z_offset"), ("x_offset", "y_offset", "pivot_length", "tilt")
 _KEYS = {XYZAC: _OFFSETS[1:], XYZBC: _OFFSETS[::2], HEAD_TABLE: _HEAD, HEAD_HEAD: _HEAD}

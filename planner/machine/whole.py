@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -101,7 +101,7 @@ class Machine(Record):
         try:
             super().__init__(**data)
         except ValidationError as fault:
-            raise InputError(faults_in_words(fault, _KEYS)) from None
+            raise InputError(faults_in_words(fault)) from None
 
     @classmethod
     def of(
@@ -286,9 +286,8 @@ _NEEDED = {
 }
 
 
-def faults_in_words(fault: ValidationError, keys: Mapping[str, Sequence[str]]) -> str:
-    """The faults of a record, each with the key, what is needed and what was found; `keys` of the record,
-    under "", and of each of its tables, under its name."""
+def faults_in_words(fault: ValidationError) -> str:
+    """The faults of a machine, each with the key, what is needed and what was found."""
     faults: list[str] = []
     found = fault.errors()
     for error in found:
@@ -300,7 +299,7 @@ def faults_in_words(fault: ValidationError, keys: Mapping[str, Sequence[str]]) -
         if error["type"] == "missing":
             faults.append(f"{key}: missing")
         elif error["type"] == "extra_forbidden":
-            known = keys.get("" if len(place) == 1 else place[0], ())
+            known = _KEYS.get("" if len(place) == 1 else place[0], ())
             near = difflib.get_close_matches(place[-1], known, n=1)
             faults.append(f"{key}: unknown key" + (f" (did you mean '{near[0]}'?)" if near else ""))
         elif error["type"] == "value_error":

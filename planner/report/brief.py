@@ -32,12 +32,7 @@ if TYPE_CHECKING:
 NOTES, LIMITS, TOOLS, FAULTS = 3, 4, 6, 2  # that are told
 DIGITS = 6  # behind the point of lengths: what is less is rounding
 QUANTITIES = {"velocity": "speed", "acceleration": "acceleration", "jerk": "jerk", "power": "drive power"}
-FURTHER = {
-    "feed": "the programmed feed",
-    TANGENTIAL.name: "acceleration along the path",
-    "none": "nothing",
-    "rest": "dwells",
-}
+FURTHER = {"feed": "the programmed feed", TANGENTIAL.name: "acceleration along the path"}
 
 
 def brief_rows(plan: Plan, units: Units, summed: Rows | None = None) -> Rows:
@@ -52,8 +47,7 @@ def brief_rows(plan: Plan, units: Units, summed: Rows | None = None) -> Rows:
         rows.append(("tools", ", ".join(said)))
     rows += saved_rows(plan) if summed is None else [(name, text) for name, text in summed if name == SAVED]
     if plan.grid is not None:
-        ranked = [(limit_text(name), round(100.0 * share)) for name, share in plan.grid.ranked()]
-        told = [f"{name} {percent} %" for name, percent in ranked if percent][:LIMITS]
+        told = [f"{limit_text(name)} {percent} %" for name, percent in plan.grid.percents()[:LIMITS]]
         rows.append(("limited by", f"{', '.join(told)} of the time{', some together' * (len(told) > 1)}"))
     rows.append(("tolerance used", _used(plan, units)))
     failed = "; ".join([FAILED, *first_of(plan.verdict.sentences, FAULTS)])

@@ -16,9 +16,8 @@ import numpy as np
 
 from planner.base.errors import InputError, NotSolvedError
 from planner.base.names import METHODS, method_name
-from planner.machine import LINEAR_AXES, Machine, load_machine
+from planner.machine import LINEAR_AXES, Machine
 from planner.nc.program import Program
-from planner.nc.reader import read_program
 from planner.nc.reading import AS_USUAL, Reading
 from planner.report.summary import summary
 
@@ -87,7 +86,7 @@ def compare(
     machine: Machine | str | Path | None = None,
     methods: str | Sequence[str | Method] | None = None,
     *,
-    limits: Sequence[OwnLimit] = (),
+    limits: OwnLimit | Sequence[OwnLimit] = (),
     tolerance: float | None = None,
     reading: Reading = AS_USUAL,
     progress: Progress | None = None,
@@ -100,17 +99,11 @@ def compare(
     Raises InputError for a program or a machine that cannot be read, and for a name that is no method; what a
     method cannot do is its row.
     """
-    from planner.planning.methods.registry import DEFAULT_MACHINE
+    from planner.planning.job.trace import Stages
+    from planner.planning.methods.registry import machine_of, program_of
 
-    if not isinstance(machine, Machine):
-        machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
-    machine.check()
-    if limits:
-        machine = machine.with_own((*machine.own, *limits))
-    if not isinstance(program, Program):
-        program = read_program(program, machine, reading)
-    elif reading != AS_USUAL:
-        raise InputError("reading: the program is read already; give the settings to read_program")
+    machine = machine_of(machine, limits)
+    program = program_of(program, machine, reading, Stages(None))
     chosen = METHODS if methods is None else [methods] if isinstance(methods, str) else methods
     for name in chosen:
         if isinstance(name, str):

@@ -33,7 +33,7 @@ from planner.report.replace import (
     refuse_inputs,
     replacing,
 )
-from planner.report.summary import json_ready, summary, tool_point_summary, uniform, versions
+from planner.report.summary import json_ready, summary, tool_point_summary, versions
 from planner.report.trajectory_file import Format, units, write_trajectory
 from planner.report.word_feed import BlockWatch, PlannedBlocks, WordFeed
 
@@ -183,7 +183,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "geometry": plan.geometry,
             "corner": plan.corner,
             "dt_s": trajectory.dt,
-            "tolerance_mm": uniform(plan.toolpath.tolerance),
+            "tolerance_mm": plan.toolpath.same_tolerance,
             "reading": plan.program.reading.changed(),
             "not_limited": plan.verdict.not_limited if plan.verdict is not None else (),
             "units": units(

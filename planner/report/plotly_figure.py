@@ -189,11 +189,11 @@ def fitted_scene(points: FloatArray, titles: Mapping[str, str]) -> tuple[dict[st
     return scene, float(ratio @ np.abs(right)), float(ratio @ np.abs(up))
 
 
-def scene_in_box(points: FloatArray, room: float, titles: Mapping[str, str]) -> dict[str, Any]:
-    """The scene of a path, `points` (n, 3), with `titles`, that fills a box; `room` is the width of that, but for the
-    colour bar, over its height [-]."""
+def scene_in_box(points: FloatArray, titles: Mapping[str, str]) -> dict[str, Any]:
+    """The scene of a path, `points` (n, 3), with `titles`, that fills a notebook's column without the colour bar: it is
+    as wide as a figure is high, at least."""
     scene, wide, high = fitted_scene(points, titles)
-    zoom = FILLED * 2.0 * min(room / wide, 1.0 / high)
+    zoom = FILLED * 2.0 * min(1.0 / wide, 1.0 / high)
     return scene | {"aspectratio": {axis: zoom * ratio for axis, ratio in scene["aspectratio"].items()}}
 
 

@@ -102,12 +102,11 @@ def _not_in_stop_time(plan: Plan) -> list[str]:
 def control_of(plan: Plan) -> ControlTimes | None:
     """What the control that the machine names takes for the program as it is; None where it names none, or
     where there is no model of that, or none for this program."""
-    control, tolerance = plan.machine.control, plan.toolpath.tolerance
+    control = plan.machine.control
     if control is None or control.name not in TIMED:
         return None
-    asked = float(tolerance[0]) if (tolerance == tolerance[0]).all() else None  # by --tolerance, or of all
     try:
-        return control_times(plan.program, plan.machine, control.name, asked)
+        return control_times(plan.program, plan.machine, control.name, plan.toolpath.same_tolerance)
     except InputError:
         return None
 

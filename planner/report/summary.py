@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.base.arrays import FloatArray
 from planner.nc.info import PLACES_SHOWN
 from planner.nc.program import ToolPoint
 from planner.report.brief import tool_times
@@ -45,7 +44,7 @@ def summary(plan: Plan) -> dict[str, Any]:
             "tools_s": tool_times(plan),
             "stop_time_s": plan.stop_time,
             "least_time_s": plan.least_time,
-            "tolerance_mm": uniform(plan.toolpath.tolerance),
+            "tolerance_mm": plan.toolpath.same_tolerance,
             "verdict": verdict.summary() if verdict is not None else None,
             "corners": plan.corners.summary() if plan.corners is not None else NO_CORNERS,
             "held_by": dict(plan.grid.ranked()) if plan.grid is not None else None,
@@ -132,12 +131,6 @@ def versions() -> dict[str, str]:
     """Versions of this package, of Python, and of the packages that compute."""
     found = {"planner": metadata.version("feedrate-planner"), "python": platform.python_version()}
     return found | {name: metadata.version(name) for name in PACKAGES}
-
-
-def uniform(tolerance: FloatArray) -> float | None:
-    """The contour tolerance (n,) if it is the same at every joint; None where the program changes it (G64
-    P)."""
-    return float(tolerance[0]) if len(tolerance) and (tolerance == tolerance[0]).all() else None
 
 
 def json_ready(value: Any) -> Any:

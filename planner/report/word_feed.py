@@ -66,7 +66,7 @@ class WordFeed:
         """(T,) feed of samples, by what F goes by in their blocks."""
         if not self.mixed:
             return trajectory.feed
-        goes_by = self._goes_by[self._segment(trajectory.block)]
+        goes_by = self._goes_by[self._toolpath.segment_at(trajectory.block)]
         squares = trajectory.velocity**2
         feed = np.zeros(len(goes_by))
         for group in range(ROTARY + 1):
@@ -79,7 +79,7 @@ class WordFeed:
         """(n,) F of the blocks `block` (n,) of a program [mm/s or deg/s]; inf for rapids."""
         feed: FloatArray = program.feed[block].copy()
         if self.mixed:
-            feed[self._goes_by[self._segment(block)] == ROTARY] /= RAD_PER_DEG
+            feed[self._goes_by[self._toolpath.segment_at(block)] == ROTARY] /= RAD_PER_DEG
         return feed
 
     def of_segments(self, feed: FloatArray) -> FloatArray:
@@ -89,12 +89,6 @@ class WordFeed:
             return feed
         found: FloatArray = feed / path_per_length(toolpath.axes, toolpath.radius, toolpath)
         found[self._goes_by == ROTARY] /= RAD_PER_DEG
-        return found
-
-    def _segment(self, block: Array) -> Array:
-        """The segment of each block; of blocks that are unknown or move nowhere one beside them."""
-        last = np.searchsorted(self._toolpath.block, block, side="right") - 1
-        found: Array = np.clip(last, 0, len(self._toolpath) - 1)
         return found
 
 

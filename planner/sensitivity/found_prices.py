@@ -82,14 +82,14 @@ class RunPrices:
                 found[laws.laws[m].name] = float(least[:, column].min()), slope
         return found
 
-    def feed_saves(self, ratio: float) -> FloatArray:
-        """(N,) time saved by `ratio` of the feed, as far as the axes can follow the motion with it [s]."""
+    def feed_saves(self) -> FloatArray:
+        """(N,) time saved by `MORE_LIMIT` more of the feed, as far as the axes can follow the motion with it [s]."""
         steps = self.found.steps
         assert steps is not None
         h = steps.h[:, None]
         velocity = steps.velocity + h * (steps.acceleration / 2.0 + h * steps.jerk / 8.0)
         follows = (self.found.run.velocity / np.maximum(np.abs(velocity), SLOWEST)).min(axis=1)
-        return np.asarray(-self.of_feed() * (1.0 - 1.0 / np.clip(follows, 1.0, ratio)))
+        return np.asarray(-self.of_feed() * (1.0 - 1.0 / np.clip(follows, 1.0, 1.0 + MORE_LIMIT)))
 
     def nearer_end(self) -> Array:
         """(N,) vertices nearest to the steps, on their legs; no end of the run but of a single leg."""
@@ -115,7 +115,7 @@ def found_prices(
         float(of_tolerance.together.sum()),
         toolpath,
         cycle_time,
-        bounds={FEED.name: fsum(float(run.feed_saves(1.0 + MORE_LIMIT).sum()) for run in runs)},
+        bounds={FEED.name: fsum(float(run.feed_saves().sum()) for run in runs)},
         unrest=UNREST,
         corners=dearest(toolpath, of_tolerance.alone),
         places=_by_place(toolpath, runs, of_tolerance.together),
@@ -173,6 +173,6 @@ def _by_place(toolpath: Toolpath, runs: list[RunPrices], by_joint: FloatArray) -
         jerk, acceleration, velocity = (run.step[:, q * axes : (q + 1) * axes].sum(axis=1) for q in range(3))
         every = velocity + run.of(price.FEED) + acceleration + run.of(price.NORMAL) + jerk
         every = every + sum(run.of(price.LAWS + m) for m in run.found.run.laws.named)
-        np.add.at(feed, run.segment, run.feed_saves(1.0 + MORE_LIMIT))
+        np.add.at(feed, run.segment, run.feed_saves())
         np.add.at(limits, run.segment, -share * every)
     return PlacePrices(feed=feed, limits=limits, tolerance=by_joint)

@@ -83,7 +83,6 @@ def way_of(toolpath: Toolpath, machine: Machine, not_limited: tuple[str, ...]) -
     wider = np.maximum(toolpath.tolerance[segment], toolpath.tolerance[joint])
     tolerance = np.where(last, toolpath.tolerance[joint], wider)
     kind = np.where(last, toolpath.joint[joint], Joint.SMOOTH)
-    point = np.vstack([toolpath.start[:1], point])
     feed = np.where(toolpath.rapid, np.inf, np.minimum(toolpath.feed, machine.feed_max or np.inf))[segment]
     feed = np.minimum(feed, np.linalg.norm(of_axes[0]))
     straight = (kind[:-1] == Joint.SMOOTH) & line[segment[:-1]] & line[segment[1:]] & (feed[:-1] == feed[1:])

@@ -185,10 +185,9 @@ def test_a_stop_ends_a_leg():
     assert len(legs_of(build("G1 X1\nG4 P1\nX2\nX3"))) == 2
 
 
-def test_zero_length_moves_are_events():
+def test_moves_of_no_length_have_no_segment():
     path = build("G1 X10\nX10\nG0 X10\nY10\nZ0")
     assert len(path) == 2
-    assert path.zero_length.tolist() == [1, 2, 4]
     assert path.block.tolist() == [0, 3]
 
 

@@ -53,7 +53,7 @@ def test_which_blocks_have_a_feed(method: str) -> None:
     made = plan(parse_program(PROGRAM, MACHINE), MACHINE, method=method)
     program, path = made.program, made.toolpath
     feeds = feeds_of(planned_blocks(made.trajectory, path), path, MACHINE, len(program))
-    still = np.isin(np.arange(len(program)), path.zero_length)
+    still = np.isin(np.arange(len(program)), path.block, invert=True)
     cuts = np.isin(program.kind, (Kind.LINE, Kind.ARC))
     np.testing.assert_array_equal(np.isfinite(feeds), cuts & ~still)
     slowest = 0.05  # [mm/s]: nothing in this program creeps

@@ -34,6 +34,18 @@ def test_eight_lines_without_a_symbol_of_papers() -> None:
     assert "acceleration of Y 70 %, the programmed feed 25 %" in said
 
 
+def test_shares_of_limits_are_rounded_as_in_the_table_of_all_rows() -> None:
+    """12.5 % is 13 % in both."""
+    plan = make_plan()
+    names, share = plan.grid.active_names, np.zeros(len(plan.grid.active_names))
+    share[0], share[1] = 0.125, 0.875
+    plan.grid = dataclasses.replace(plan.grid, share=share)
+    assert dict(plan_rows(plan))["held by"] == f"{names[1]} 88 %, {names[0]} 13 %"
+    assert dict(brief_rows(plan, UNITS["mm"]))["limited by"] == (
+        f"{limit_text(names[1])} 88 %, {limit_text(names[0])} 13 % of the time, some together"
+    )
+
+
 def test_what_is_saved_against_a_stop_and_never_less_than_nothing() -> None:
     plan = make_plan()
     assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith(

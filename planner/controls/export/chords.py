@@ -48,17 +48,14 @@ class Group:
     placed: frozenset[str]
 
 
-def planned_polyline(plan: Plan, within: float, breaks: Array | None = None) -> Polyline:
+def planned_polyline(plan: Plan, within: float, breaks: Array) -> Polyline:
     """The planned motion as a polyline that misses no setpoint by more than `within` [mm], above the rounding
-    of coordinates; `breaks` (K,) are the blocks before which something else happens, ascending, or None: the
-    program's events.
+    of coordinates; `breaks` (K,) are the blocks before which something else happens, ascending.
 
     Raises ValueError for a plan without a trajectory.
     """
     trajectory = plan.require().trajectory
     assert trajectory is not None
-    if breaks is None:
-        breaks = np.unique([event.block for event in plan.program.events]).astype(np.int64)
     rows, miss = _vertices(trajectory, _fixed(plan, trajectory, breaks), within)
     points = _rounded(trajectory.position[rows])
     feed = np.maximum(np.maximum.reduceat(trajectory.feed, rows[:-1]), trajectory.feed[rows[1:]])
@@ -75,10 +72,9 @@ def programmed_polyline(plan: Plan, within: float) -> Polyline:
     toolpath = plan.toolpath
     chord = np.sqrt(8.0 * within / np.maximum(toolpath.curvature, 1e-12))
     count = np.where(toolpath.straight, 1, np.ceil(toolpath.length / chord)).astype(np.int64)
-    ends, segment = polyline(toolpath, count)
-    vertices: FloatArray = np.vstack([toolpath.start[:1], ends])
+    points, segment = polyline(toolpath, count)
     return Polyline(
-        points=_rounded(vertices),
+        points=_rounded(points),
         feed=toolpath.feed[segment],
         block=toolpath.block[segment],
         rapid=toolpath.rapid[segment],

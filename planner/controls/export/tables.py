@@ -32,7 +32,7 @@ from planner.nc.program import Kind, Program
 
 WITHIN = 1e-3  # [mm]: a thousandth of a millimetre, below what contour tolerances are
 PERIODS_MAX = 64  # interpolation periods between two rows at most: feedback and feed override need some rows
-PVT, PT, TWINCAT, ROS = TABLES = ("pvt", "pt", "twincat", "joint-trajectory")
+PVT, PT, TWINCAT, ROS = "pvt", "pt", "twincat", "joint-trajectory"
 STRAIGHT = (PT, TWINCAT)  # tables between whose rows axes move straight
 _WHOLE = 1e-6  # of a period: what a cycle may be off a whole number of them
 _NANOSECONDS = 10**9  # in a second
@@ -43,9 +43,9 @@ _MM_PER_M = 1000.0
 class Table:
     """What a table holds."""
 
-    kind: str = PVT  # one of `TABLES`
+    kind: str = PVT  # or `PT`, `TWINCAT`, `ROS`
     unit: str = "mm"  # of lengths, or inch; rotary axes: degrees. Of joint trajectories always m and rad
-    # how far the motion between rows may be from the setpoints [mm], on rotary axes the same number in
+    # how far the motion between rows may be from the setpoints [mm], > 0, on rotary axes the same number in
     # degrees; None for `WITHIN`, and for any distance where a cycle is given
     within: float | None = None
     cycle: float | None = None  # time between rows [s]; None for the longest that stays within
@@ -57,15 +57,12 @@ def write_table(directory: Path, trajectory: Trajectory, table: Table) -> tuple[
     """Write the files into an existing directory; returns the interpolation periods between two rows, and the
     largest distance found [mm].
 
-    Raises InputError for another unit than mm or inch, a distance that is not above 0 or that the cycle exceeds, a cycle
-    that is no whole number of interpolation periods, and as many names of joints as there are no axes;
-    for a motion that is not from rest to rest too.
+    Raises InputError for a distance that the cycle exceeds, a cycle that is no whole number of interpolation periods,
+    and as many names of joints as there are no axes; for a motion that is not from rest to rest too.
     """
     require_rest(trajectory.from_rest_to_rest)
     scale = scale_of(trajectory, table.unit)
     within = WITHIN if table.within is None else table.within
-    if not within > 0:
-        raise InputError(f"--within must be above 0 mm, found {within:g}")
     rotary = np.array([axis in ROTARY_AXES for axis in trajectory.axes])
     allowed = np.where(rotary, within * RAD_PER_DEG * trajectory.radius, within)
     straight = table.kind in STRAIGHT

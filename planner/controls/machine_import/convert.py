@@ -55,7 +55,7 @@ def import_machine(
 
     path      : LinuxCNC's INI file, what `$$` of grbl or M503 of Marlin printed, or Klipper's printer.cfg
     control   : whose settings it is: "linuxcnc", "grbl", "klipper" or "marlin"; None to recognise it
-    ramp_time : in which an axis builds up its acceleration [s], for jerks that the control does not know
+    ramp_time : in which an axis builds up its acceleration [s], > 0, for jerks that the control does not know
     tolerance : contour tolerance [mm]; None for that of the settings
     given     : limits that the settings lack or that replace theirs, such as {"z.jerk": 1e4}, in mm (deg) and
                 s
@@ -115,8 +115,6 @@ def _axes(
     found: ControlSettings, ramp_time: float, given: Mapping[str, float], source: str
 ) -> tuple[dict[str, dict[str, Sourced]], list[str]]:
     """Limits by axis and quantity, and what of them is assumed. Raises InputError for what is missing."""
-    if not 0.0 < ramp_time < float("inf"):
-        raise InputError(f"the ramp time must be above 0 s, found {ramp_time:g}")
     limits = {name: dict(getattr(found, name)) for name in DERIVATIVES}
     for name, value in given.items():
         letter, _, quantity = name.partition(".")

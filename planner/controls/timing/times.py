@@ -138,8 +138,7 @@ def control_points(toolpath: Toolpath, control: Control) -> tuple[FloatArray, Ar
     curve = toolpath.curve >= 0
     chord = np.sqrt(8.0 * toolpath.along[curve] / toolpath.curvature[curve])
     count[curve] = np.ceil(toolpath.length[curve] / chord).astype(np.int64)
-    ends, segment = polyline(toolpath, count)
-    return np.vstack([toolpath.start[:1], ends]), segment
+    return polyline(toolpath, count)
 
 
 def _on_linuxcnc(program: Program, toolpath: Toolpath, machine: Machine, name: str, text: bytes) -> _Timed:

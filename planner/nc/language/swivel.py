@@ -50,10 +50,9 @@ def siemens(making: Making, given: Mapping[str, float]) -> None:
         if angle:
             matrix = matrix @ turned(angle, (mode >> 2 * k & 3) - 1)
     shift = (before + matrix @ behind) * making.unit
-    _no_frame(making, matrix, shift)
     side = given.get("p13", -1.0)
     way = NO_MOVE if not given else _TURN if side else _STAY
-    tilt(making, matrix, shift, way, int(side) if any(angles) else 0)
+    plane(making, matrix, shift, way, int(side) if any(angles) else 0)
     set_frame(making)
 
 

@@ -24,7 +24,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.machine import Machine, Times
 from planner.nc.program import EventTable, Program
 
-TOOL_CHANGE, SPINDLE_START, SPINDLE_STOP = 6, 3, 5  # M codes
+TOOL_CHANGE = 6  # M code
 _TURNS = {3: 1, 4: -1, 5: 0, TOOL_CHANGE: 0}  # M codes, and how the spindle turns after them
 _WITH_THE_MOTION = (62, 63, 67)  # signals that the control sets at the next move
 NO_TIME = "no time in the machine file"

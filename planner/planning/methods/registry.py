@@ -97,20 +97,8 @@ def plan(
     joints = not isinstance(method, str) or METHODS[method_name(method)].joints
     if isinstance(method, str):
         method = make_method(method, **given)
-    if not isinstance(machine, Machine):
-        machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
-    machine.check()
-    if not isinstance(limits, Sequence):
-        limits = (limits,)
-    if limits:
-        machine = machine.with_own((*machine.own, *limits))
-
-    stages = Stages(progress)
-    if not isinstance(program, Program):
-        with stages.stage("read"):
-            program = read_program(program, machine, reading)
-    elif reading != AS_USUAL:
-        raise InputError("reading: the program is read already; give the settings to read_program")
+    machine, stages = machine_of(machine, limits), Stages(progress)
+    program = program_of(program, machine, reading, stages)
     machine = limited(machine, program.limits)
     chain = chain_of(program, machine)
     if chain is not None and np.isfinite(machine.powers(LINEAR_AXES)).any():
@@ -122,6 +110,25 @@ def plan(
     if chain is not None:
         made = in_joints(made, machine, chain)
     return dataclasses.replace(made, timings=stages.timings | made.timings)
+
+
+def machine_of(machine: Machine | str | Path | None, limits: OwnLimit | Sequence[OwnLimit] = ()) -> Machine:
+    """A machine as `plan` takes it, with `limits` beside its own. Raises InputError as `plan` does."""
+    if not isinstance(machine, Machine):
+        machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
+    machine.check()
+    more = limits if isinstance(limits, Sequence) else (limits,)
+    return machine.with_own((*machine.own, *more)) if more else machine
+
+
+def program_of(program: Program | str | Path, machine: Machine, reading: Reading, stages: Stages) -> Program:
+    """A program as `plan` takes it. Raises InputError for settings of the reader beside one that is read already, too."""
+    if not isinstance(program, Program):
+        with stages.stage("read"):
+            return read_program(program, machine, reading)
+    if reading != AS_USUAL:
+        raise InputError("reading: the program is read already; give the settings to read_program")
+    return program
 
 
 def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:

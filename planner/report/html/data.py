@@ -91,7 +91,7 @@ def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
     shown = _thinned(trajectory, step)
     names, limit = _limits(plan, shown)
     word = WordFeed(plan.toolpath)
-    segment = np.maximum(np.searchsorted(plan.toolpath.block, shown.block, side="right") - 1, 0)
+    segment = plan.toolpath.segment_at(shown.block)
     return Samples(
         step=step,
         shown=shown,
@@ -190,8 +190,7 @@ def lines_of(plan: Plan, samples: Samples) -> Lines:
     row = np.cumsum(fresh) - 1  # of each segment
     rows = int(row[-1]) + 1 if len(row) else 0
     programmed = np.where(toolpath.rapid, np.nan, toolpath.length / toolpath.feed)
-    segment = np.maximum(np.searchsorted(toolpath.block, samples.shown.block, side="right") - 1, 0)
-    at = row[segment]
+    at = row[toolpath.segment_at(samples.shown.block)]
     highest, unseen = np.full(rows, -1.0), np.zeros(rows)
     np.maximum.at(highest, at, samples.feed)
     np.maximum.at(unseen, row, WordFeed(toolpath).of_segments(blocks.highest))
@@ -227,7 +226,6 @@ def programmed_path(toolpath: Toolpath, most: int = PROGRAMMED_MAX) -> FloatArra
     if not len(toolpath):
         return np.zeros((0, 3))
     count = np.where(toolpath.straight, 1, ARC_POINTS)
-    points, _ = polyline(toolpath, count)
-    points = np.vstack([toolpath.start[:1], points])[:, linear]
+    points = polyline(toolpath, count)[0][:, linear]
     points = points[:: max(1, -(-len(points) // most))]
     return np.pad(points, ((0, 0), (0, 3 - len(linear))))

@@ -172,7 +172,6 @@ def _held(plan: Plan) -> str:
 POINTS_MAX = SIZES.figure_samples
 COLOURINGS = ("feed", "limit", "deviation")
 OVER = ("t", "s")  # of `AGAINST`
-ROOM = 1.0  # width of a notebook's column without the colour bar over the height of a figure [-], at least
 
 
 class PlanFigures:
@@ -214,7 +213,7 @@ class PlanFigures:
             "hovertemplate": f"line %{{customdata[0]}}<br>feed %{{customdata[1]:.4~g}} {units.feed}<br>held by %{{customdata[2]}}"
             "<br>t %{customdata[3]:.4f} s<extra></extra>",
         }
-        scene = scene_in_box(np.concatenate([xyz, programmed]), ROOM, axis_titles(self._plan.program, units))
+        scene = scene_in_box(np.concatenate([xyz, programmed]), axis_titles(self._plan.program, units))
         behind = PROGRAMMED | dict(zip(LINEAR_AXES, programmed.T, strict=True))
         return self._figure(
             [behind, motion], {"scene": scene, "margin": BARE | {"t": 30}, "showlegend": False}, 560

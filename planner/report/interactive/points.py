@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
-from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine, load_machine
+from planner.machine import LINEAR_AXES, ROTARY_AXES, Machine
 from planner.machine.kinematics.chain import LINEAR, kinematics_of
 from planner.machine.kinematics.directions import rotary_along
 from planner.machine.parts import TOLERANCE_MIN
@@ -18,7 +18,7 @@ from planner.nc.program import Kind, Program, SplineTable
 from planner.nc.reader import read_program
 from planner.planning.job.at_tip import Judged, judged
 from planner.planning.job.plan import Plan
-from planner.planning.methods.registry import DEFAULT_MACHINE
+from planner.planning.methods.registry import machine_of
 from planner.report.judging import judge
 from planner.report.trajectory_reader import trajectory_of_columns
 from planner.verifier import NOT_LIMITED_NAMES, Verdict, fit_axes
@@ -284,9 +284,7 @@ def verify(
     >>> found.passed, str(found.faults[0])[:18], round(found.limits["feed"].ratio, 2)
     (False, 'start: not at rest', 0.75)
     """
-    if not isinstance(machine, Machine):
-        machine = load_machine(DEFAULT_MACHINE if machine is None else machine)
-    machine.check()
+    machine = machine_of(machine)
     for name in not_limited:
         if name not in NOT_LIMITED_NAMES:
             raise InputError(f"not_limited: no such limit '{name}'; there are {', '.join(NOT_LIMITED_NAMES)}")

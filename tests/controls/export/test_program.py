@@ -72,7 +72,7 @@ def test_the_fastest_prediction_is_written(plan: Plan, tmp_path: Path) -> None:
 
 def test_chords_miss_no_setpoint_by_more(plan: Plan) -> None:
     assert plan.trajectory is not None
-    wide, narrow = planned_polyline(plan, 2e-3), planned_polyline(plan, 5e-4)
+    wide, narrow = (planned_polyline(plan, within, np.zeros(0, dtype=int)) for within in (2e-3, 5e-4))
     for line, within in ((wide, 2e-3), (narrow, 5e-4)):
         off = distances(plan.trajectory.position[::7], line.points)
         assert off.max() <= line.miss <= within

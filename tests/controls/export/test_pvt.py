@@ -66,13 +66,6 @@ def test_inches(tmp_path: Path, motion: Trajectory) -> None:
     assert inch["t"] == pytest.approx(mm["t"])
 
 
-def test_what_cannot_be_is_refused(tmp_path: Path, motion: Trajectory) -> None:
-    with pytest.raises(InputError, match="must be above 0"):
-        write_table(tmp_path, motion, Table(within=0.0))
-    with pytest.raises(InputError, match="no unit 'cm'"):
-        write_table(tmp_path, motion, Table(unit="cm"))
-
-
 @pytest.mark.shows("export-pt", "exact: straight moves between rows, within the distance")
 def test_straight_rows_at_the_cycle_of_a_drive(tmp_path: Path, motion: Trajectory) -> None:
     periods, miss = write_table(tmp_path, motion, Table(kind="pt", cycle=0.004))

@@ -194,7 +194,6 @@ def test_limits_can_be_given_and_replace_those_of_the_settings(tmp_path: Path) -
         (KLIPPER.replace("corexy", "delta"), {}, "kinematics is delta"),
         (GRBL, {"control": "grble"}, "did you mean 'grbl'"),
         (GRBL, {"given": {"q.jerk": 1.0}}, "'q.jerk' is no limit of an axis"),
-        (GRBL, {"ramp_time": 0.0}, "ramp time must be above 0"),
         (GRBL, {"tolerance": -1.0}, "tolerance"),
     ],
 )

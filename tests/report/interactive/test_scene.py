@@ -37,14 +37,14 @@ def on_screen(scene: dict, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", PATHS)
 def test_the_whole_path_is_in_sight_and_fills_the_box(name):
     points = np.array(PATHS[name], dtype=float)
-    places = on_screen(scene_in_box(points, 1.0, TITLES), points)
+    places = on_screen(scene_in_box(points, TITLES), points)
     assert np.abs(places).max() <= 0.9, "half of the height of the box is 1, and titles need some of it"
     assert np.ptp(places, axis=0).max() >= 1.2
 
 
 def test_lengths_have_one_scale():
     """A circle is no ellipse: a millimetre is as long along every axis."""
-    scene = scene_in_box(np.array(PATHS["an L three times as high as wide"], dtype=float), 1.0, TITLES)
+    scene = scene_in_box(np.array(PATHS["an L three times as high as wide"], dtype=float), TITLES)
     scales = [scene["aspectratio"][letter] / np.ptp(scene[f"{letter}axis"]["range"]) for letter in "xyz"]
     np.testing.assert_allclose(scales, scales[0], rtol=1e-12)
 

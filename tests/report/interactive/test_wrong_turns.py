@@ -83,3 +83,9 @@ def test_a_machine_changed_by_model_copy_is_checked(changed: dict[str, object], 
 
 def test_one_name_is_a_method_and_no_sequence_of_letters() -> None:
     assert [row.method for row in planner.compare(corner(), "mill", "stop")] == ["stop"]
+
+
+def test_one_limit_of_ones_own_is_a_limit_for_compare_as_for_plan() -> None:
+    (row,) = planner.compare(corner(), "mill", "stop", limits=Slow())
+    assert row.cycle_time == planner.plan(corner(), "mill", method="stop", limits=Slow()).cycle_time
+    assert row.worst["velocity"][1] == "velocity.slow"

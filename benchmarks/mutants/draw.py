@@ -24,10 +24,12 @@ AREAS = {
     "reader": ("planner/nc/*.py", "planner/nc/language/*.py", "planner/nc/language/*/*.py", "planner/nc/hpgl/*.py"),
     "exports": ("planner/controls/export/*.py",),
     "imports": ("planner/controls/machine_import/*.py",),
-    "prices": ("planner/sensitivity/*price*.py", "planner/sensitivity/places.py", "planner/sensitivity/*activity.py"),
+    "prices": ("planner/sensitivity/*price*.py", "planner/sensitivity/*activity.py"),
     "bound": tuple(
         f"planner/sensitivity/{name}.py"
-        for name in ("least_time", "straight_time", "corner_speeds", "waypoints", "turning_back", "sampled_*", "linear_program")
+        for name in (
+            "least_time", "straight_time", "corner_speeds", "bends", "waypoints", "turning_back", "sampled_*", "linear_program",
+        )
     ),
 }  # fmt: skip
 ROUNDING = 1e-5

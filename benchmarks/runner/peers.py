@@ -9,7 +9,7 @@
     ipopt, fatrop       geometry and feed together (method tube), by casadi's solvers on a whole run
 
 Models have no motion and no verdict: they are this project's short descriptions of what a control documents
-(planner/controls/export), and give a time only. grbl, Klipper and Marlin stay on the path and know no jerk; LinuxCNC gets G64 P
+(planner/controls/timing), and give a time only. grbl, Klipper and Marlin stay on the path and know no jerk; LinuxCNC gets G64 P
 with the tolerance.
 """
 

@@ -25,7 +25,7 @@ from typing import Any
 
 from benchmarks.cost.growth import relief
 from benchmarks.jobs import problems
-from benchmarks.record import markdown, write_results
+from benchmarks.record import ROOT, markdown, write_results
 from planner.base.threads import use_threads
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
@@ -41,7 +41,6 @@ from planner.nc.reader import parse_program, read_program
 from planner.planning.optimal.geometry import splined_with_stops
 from planner.smoothing.spline_path import with_spline
 
-ROOT = Path(__file__).resolve().parents[1]
 # Parts of a solve: functions of Python by module, timed around each call.
 PARTS = {
     "start": (
@@ -51,7 +50,7 @@ PARTS = {
     "track": ("planner.feedrate.jerk.window", ("track",)),
     "blocks": ("planner.feedrate.jerk.layout", ("_fill", "_jumps")),
     "result": ("planner.feedrate.jerk.window", ("_found",)),
-    "iterate": ("planner.feedrate.jerk.interior_point", ("minimise_time",)),
+    "iterate": ("planner.feedrate.jerk.window", ("minimise_time",)),
 }
 
 

@@ -211,9 +211,9 @@ def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, 
 
 
 def assume_seconds(state: State, block: Block, seconds: float, findings: Findings) -> None:
-    """Say it if a dwell is so long that its P is most likely in another unit."""
+    """Say it if a dwell is so long that it is most likely in another unit."""
     if seconds >= _LONG and not state.seconds_meant:
-        text = f"a dwell of {seconds:g} s: P is read in seconds, as LinuxCNC and grbl have it; in ms: --dialect fanuc, or marlin"
+        text = f"a dwell of {seconds:g} s: read in seconds, as LinuxCNC and grbl have it; in ms: --dialect fanuc, or marlin"
         findings.assume(text, block.line, block.at.get("P", block.motion_word()))
 
 

@@ -132,9 +132,10 @@ class Method(ABC):
         limits = Limits.of(machine, job.toolpath.axes)
         for limit, value in ((TANGENTIAL, limits.tangential), (TANGENTIAL_JERK, limits.tangential_jerk)):
             if np.isfinite(value) and not self.keeps_tangential:
+                without_jerk = "second-order, " if limit is TANGENTIAL else ""
                 raise InputError(
                     f"the machine limits the {limit.key.replace('_', ' ')} to {value:g} {limit.unit}, which {self!r} does not keep; "
-                    f"plan with method optimal, second-order, bezier or stop, or leave {limit.key} out of the machine"
+                    f"plan with method optimal, {without_jerk}tube, bezier or stop, or leave {limit.key} out of the machine"
                 )
         limited = np.isfinite(limits.power)
         if limited.any() and not self.keeps_power:

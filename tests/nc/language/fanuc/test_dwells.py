@@ -81,6 +81,8 @@ def test_a_long_dwell_in_seconds_is_said_first_unless_the_dialect_is_given(text:
     short = parse_program(HEAD + "G4 P59\n", machine())
     assert not short.assumptions
     assert np.isclose(short.dwell.sum(), 59.0)
+    (of_x,) = parse_program(HEAD + "G4 X70.\n", machine()).assumptions
+    assert "a dwell of 70 s: read in seconds" in of_x  # whatever its letter is
 
 
 @pytest.mark.parametrize("letter", "XU")

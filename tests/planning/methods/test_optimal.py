@@ -141,7 +141,9 @@ def test_a_dwell_at_the_end_is_stood_through():
 
 
 @pytest.mark.usual_sizes
-def test_large_motions_are_searched_in_long_steps_also_where_these_are_finer_than_what_is_delivered(monkeypatch):
+def test_large_motions_are_searched_in_long_steps_also_where_these_are_finer_than_what_is_delivered(
+    monkeypatch,
+):
     """A zig-zag counts as large. 20,000 blocks of some um take 1.6 % less time for it (benchmarks/cost/long_jobs.py)."""
     job = problems.zigzag(4)
     fine = planner.plan(job, MACHINE)

@@ -240,9 +240,10 @@ class Interpreter:
         mover.check_offsets(self.state, block, compensated=self.mover.cutter is not None)
         self.state.numbers |= {c: block.value[c] for c in block.value.keys() & {"D", "H"}}
         assert self._words is not None
-        auxiliary.set_feed(self.state, block, self.findings, self._words.column)
+        printer = self.ignored.printer
+        auxiliary.set_feed(self.state, block, self.findings, self._words.column, printer=printer)
         self._timed |= self.state.feed_mode == "inverse time"
-        auxiliary.events(self.state, self.table, block, self.findings)
+        auxiliary.events(self.state, self.table, block, self.findings, printer=printer)
         if block.g.get("one-shot") == 40:
             auxiliary.dwell(self.state, self.table, block, self.ignored, self.findings)
         self._modes(block)

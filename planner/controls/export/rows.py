@@ -287,16 +287,17 @@ class _Follower:
         elif one_shot == G53:
             row.motion = self.motion
             self.placed -= named
-        elif one_shot == -1 and LENGTHS.isdisjoint(g) and (named or row.feeds or self._turns_round(row, g)):
+        elif one_shot == -1 and LENGTHS.isdisjoint(g) and (named or row.feeds or self._bends(row, g)):
             row.motion = self.motion
             if row.moves:
                 row.plain = self._is_plain(row, named)
             self.placed |= self._told(row, named) if self.absolute else frozenset()
 
-    def _turns_round(self, row: Row, g: list[int]) -> bool:
-        """Whether it is a full circle, which needs no coordinate."""
+    def _bends(self, row: Row, g: list[int]) -> bool:
+        """Whether it moves without a coordinate: on a full circle, or along the NURBS of the lines behind it."""
         said = not codes.ARCS.isdisjoint(g) or any(word.letter in "IJKR" for word in row.words)
-        return self.motion in codes.ARCS and said
+        along = self.motion in codes.SPLINES and bool(self.simple[row.first : row.last].any())
+        return along or (self.motion in codes.ARCS and said)
 
     def _told(self, row: Row, named: frozenset[str]) -> frozenset[str]:
         """Axes of which a row's words tell where they are after it: not a cycle's depth, it comes back."""

@@ -7,11 +7,18 @@ from types import SimpleNamespace
 import pytest
 
 import planner
+from benchmarks.controls.export_judge import OFFSETS, STARTS, alike, path, readable
+from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
 from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS, is_setting
 
 CURVE = "G21 G90\nG0 Z1\nG5.2 P1 X4 Y2 L3 F600\nP1 X6 Y3\nP1 X8 Y1\nG5.3\nM2\n"
+
+
+def passed(text: str) -> FloatArray:
+    """(n, 3) the places of a program [mm]."""
+    return path(text, planner.load_machine("mill"), STARTS[0], OFFSETS[0])
 
 
 def test_a_curve_that_no_straight_moves_can_say_is_refused_with_its_line() -> None:
@@ -22,6 +29,23 @@ def test_a_curve_that_no_straight_moves_can_say_is_refused_with_its_line() -> No
     with pytest.raises(InputError, match=r"G5\.2 \(it cannot be written as straight moves") as fault:
         job.written(one)
     assert fault.value.line == 3
+
+
+@pytest.mark.parametrize("control", ["grbl", "klipper"])
+def test_a_curve_whose_first_line_has_no_coordinates_is_written(control: str) -> None:
+    """The control points stand in the lines behind it: the whole curve was left out."""
+    text = "G21 G90\nG0 X0 Y0 Z1\nG1 X3 Y2 F600\nG5.2 P1 L3\nX4 Y5\nX8 Y1\nG5.3\nG1 X12\nM2\n"
+    made = planner.plan(planner.read_program(text=text, machine="mill"), "mill", method="stop")
+    job = Candidates(made, CONTROLS[control], 0.05)
+    for one in (*job.own(1e-3), *job.chords(1e-3)):
+        out = readable(job.written(one)[0].decode())
+        assert alike(passed(text), passed(out), 0.05)
+    unplaced = text.replace("G0 X0 Y0 Z1\n", "G0 Z1\n").replace("G1 X3 Y2", "G1 X3")
+    made = planner.plan(planner.read_program(text=unplaced, machine="mill"), "mill", method="stop")
+    job = Candidates(made, CONTROLS[control], 0.05)
+    (one,) = job.own(1e-3)
+    with pytest.raises(InputError, match=r"G5\.2 \(it cannot be written as straight moves"):
+        job.written(one)
 
 
 @pytest.mark.parametrize(("code", "known"), [(1090, True), (1091, False), (990, False), (991, False)])

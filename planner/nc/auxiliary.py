@@ -231,14 +231,6 @@ def assume_seconds(state: State, block: Block, seconds: float, findings: Finding
         findings.assume(text, block.line, block.at.get("P", block.motion_word()))
 
 
-def assume_rapids(table: BlockTable, ignored: IgnoredWords, findings: Findings) -> None:
-    """Say it if G0 of a printer, which runs it at F, is planned as a rapid."""
-    rapid = table.block.kind[: table.blocks] == Kind.RAPID
-    if ignored.printer and rapid.any():
-        text = "G0 is planned at the limits of the axes; 3-D printers run it at F"
-        findings.assume(text, int(table.block.line[rapid.argmax()]))
-
-
 def path_control(state: State, block: Block, ignored: IgnoredWords, findings: Findings) -> None:
     """G61, G61.1 and G64 with its tolerance. Raises WordFault, for Marlin's G61 too."""
     word, code = block.at["path control"], block.g["path control"]

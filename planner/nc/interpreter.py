@@ -104,7 +104,6 @@ class Interpreter:
                 self.mover.cutter.fix()  # the last move, if the program just ends while compensation is on
             except CutterFault as fault:
                 self.findings.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
-        auxiliary.assume_rapids(self.table, self.ignored, self.findings)
         limits = self.limits.throughout(self.table, self.machine, self.findings)
         read = self.table.finish(self.source, self.notes, frames, self.reading, self.state.letters)
         read = dataclasses.replace(read, limits=limits)

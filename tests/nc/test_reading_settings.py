@@ -59,7 +59,7 @@ def test_values_of_settings_are_checked() -> None:
 
 def test_extruder_words_are_left_out_if_the_user_says_so() -> None:
     text = "M82\nG21 G92 E0\nG1 X1 Y1 E0.5 F600\nG1 E-2 F2400\nG1 X2 E1e-05\nG0 X3"
-    plain = parse_program("\nG21\nG1 X1 Y1 F600\nG1 F2400\nG1 X2\nG0 X3")
+    plain = parse_program("\nG21\nG1 X1 Y1 F600\nG1 F2400\nG1 X2\nX3")
     program = parse_program(text, reading=NO_EXTRUDER)
     assert same_motion(program, plain)
     assert any(note.startswith("4 E words: left out (--extruder ignore)") for note in program.notes)

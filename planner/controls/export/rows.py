@@ -40,6 +40,7 @@ LENGTHS = frozenset((431, 432))  # whose axis words are lengths of tools
 COMPENSATION_ON, COMPENSATION_OFF = frozenset((410, 411, 420, 421)), 400
 ENDS = frozenset((20, 300))  # M2 and M30, in tenths
 _TOOL_CHANGE = 6
+_LINE = 10  # G1, in tenths
 _ROUGH_CYCLES = frozenset((730, 810, 820, 830, 850, 890))  # that neither stop nor turn the spindle
 _FLAG = re.compile(r"([A-FH-LP-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)|)[ \t]*", re.IGNORECASE)
 _FLAGS = re.compile(f"(?:{_FLAG.pattern})+", re.IGNORECASE)
@@ -89,6 +90,7 @@ class Row:
     radius: bool = False  # cutter radius compensation acts on it, or ends with it
     placed: frozenset[str] = frozenset()  # letters of axes whose place words before it have told
     plain: bool = False  # chords may replace what it moves
+    at_feed: bool = False  # its G0 runs at F, as printers run it: the motion code is that of G1
 
     def g(self) -> list[int]:
         """Its G codes in tenths."""
@@ -288,7 +290,8 @@ class _Follower:
             row.motion = self.motion
             self.placed -= named
         elif one_shot == -1 and LENGTHS.isdisjoint(g) and (named or row.feeds or self._bends(row, g)):
-            row.motion = self.motion
+            row.at_feed = self.motion == 0 and Kind.LINE in self.program.kind[row.first : row.last]
+            row.motion = _LINE if row.at_feed else self.motion
             if row.moves:
                 row.plain = self._is_plain(row, named)
             self.placed |= self._told(row, named) if self.absolute else frozenset()

@@ -160,6 +160,8 @@ def _row_why_not(row: Row, source: Source, control: Control) -> str:
             return f"{word} is not known"
         if of_code is None and not control.one_command and word.letter not in control.letters:
             return f"{word}: letter {word.letter} is not known"
+    if row.at_feed and not control.rapid_feed:
+        return "G0, which printers run at F"
     if G4 in row.g():
         p = row.value("P")
         lasts = 0.0 if p is None else p.value * (MILLISECOND if control.milliseconds else 1.0)

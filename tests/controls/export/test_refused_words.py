@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -46,6 +47,21 @@ def test_a_curve_whose_first_line_has_no_coordinates_is_written(control: str) ->
     (one,) = job.own(1e-3)
     with pytest.raises(InputError, match=r"G5\.2 \(it cannot be written as straight moves"):
         job.written(one)
+
+
+@pytest.mark.parametrize("control", ["klipper", "marlin", "grbl", "linuxcnc"])
+def test_g0_of_a_printer_keeps_its_f(control: str) -> None:
+    """It was written at the limits of the axes, F30000 for F1200; on a mill's control it would be a rapid."""
+    text = "G21\nG90\nG0 X10 Y10 Z2 F1200\nG1 X30 F600\nG0 F900\nX40 Y12\nG1 Y40\n"
+    made = planner.plan(planner.read_program(text=text, machine="ender3"), "ender3", method="stop")
+    job = Candidates(made, CONTROLS[control], 0.06)
+    why = {"grbl": "line 3: G0, which printers run at F", "linuxcnc": "LinuxCNC reads it otherwise"}
+    assert why.get(control, "line 6") in job.why_not
+    for one in (*job.own(1e-3), *job.chords(1e-3)):
+        lines = job.written(one)[0].decode().splitlines()
+        assert not any("G0" in line.split() for line in lines)
+        feeds = [float(found) for line in lines for found in re.findall(r" F([\d.]+)", line)]
+        assert max(feeds) == 1200.0
 
 
 @pytest.mark.parametrize(("code", "known"), [(1090, True), (1091, False), (990, False), (991, False)])

@@ -116,10 +116,15 @@ def _surface_speed(state: State) -> float:
     return state.spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
 
 
+def _surface_turns(state: State, radius: float) -> float:
+    """Speed of the spindle [1/min] at a radius [mm]; inf on the axis, if it has no bound."""
+    turns = _surface_speed(state) / (2.0 * math.pi * abs(radius)) if radius else math.inf
+    return min(turns, state.spindle.speed_max or math.inf)
+
+
 def surface_feed(state: State, radius: float, word: int) -> float:
     """Feed [mm/s] at a radius [mm]. Raises WordFault on the axis, if the speed has no bound."""
-    turns = _surface_speed(state) / (2.0 * math.pi * abs(radius)) if radius else math.inf
-    turns = min(turns, state.spindle.speed_max or math.inf)
+    turns = _surface_turns(state, radius)
     if math.isinf(turns):
         move = "a move to the spindle's axis under a constant surface speed (G96) without a largest speed"
         raise WordFault(word, f"{move} has no feed; write G50 S, or D beside G96")
@@ -192,13 +197,25 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings, *,
             table.add_event("M", block.m[group] / 10, line)
     state.spindle.turning = TURNING.get(block.m.get("spindle", -1), state.spindle.turning)
     if "spindle mode" in block.g:
-        surface = state.spindle.surface_speed = block.g["spindle mode"] == 960
+        surface = block.g["spindle mode"] == 960
         text = "G96 needs the surface speed as an S word"
         block.require(not surface or "S" in block.value, text, "spindle mode")
+        if not surface and state.spindle.surface_speed and "S" not in block.value:
+            _keep_speed(state, block, findings)
+        state.spindle.surface_speed = surface
         state.spindle.speed_max = abs(block.value.get("D", 0.0))
     for code in block.g.values():
         if code in codes.G_EVENTS:
             table.add_event("G", code / 10, line)
+
+
+def _keep_speed(state: State, block: Block, findings: Findings) -> None:
+    """G97 without S behind G96: the spindle keeps the speed that it has. Raises WordFault where that has no bound."""
+    turns = _surface_turns(state, float(state.programmed()[0]))
+    text = "G97 on the spindle's axis needs its speed as an S word"
+    block.require(math.isfinite(turns), text, "spindle mode")
+    state.spindle.speed = turns
+    findings.assume(f"G97 without S: the spindle keeps its speed of {turns:.0f} 1/min", block.line)
 
 
 def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, findings: Findings) -> None:

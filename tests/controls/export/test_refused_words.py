@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -75,3 +76,17 @@ def test_grbl_has_the_codes_of_its_page() -> None:
     """Those that grbl 1.1 lists as supported, but for probing (doc/markdown/commands.md and README of gnea/grbl)."""
     page = "0 1 2 3 4 10 17 18 19 20 21 28 28.1 30 30.1 40 43.1 49 53 54 55 56 57 58 59 61 80 90 91 91.1 92 92.1 93 94"
     assert CONTROLS["grbl"].g == {round(10 * float(code)) for code in page.split()}
+
+
+def test_a_sinumerik_program_is_exported_whatever_its_file_is_called(tmp_path: Path) -> None:
+    """The text that it is written out as was read by the ending of the file, as a Sinumerik's, and refused."""
+    job = tmp_path / "JOB.MPF"
+    job.write_text(
+        "N10 G71 G90 G17\nN20 R1=10\nN30 G0 X0 Y0 Z5\nN40 G1 X=R1 F500\nN50 G2 X20 Y0 CR=5\nN60 M30\n"
+    )
+    made = planner.plan(planner.read_program(job, machine="mill"), "mill", method="stop")
+    written = Candidates(made, CONTROLS["grbl"], 0.05)
+    (one,) = written.own(1e-3)
+    lines = written.written(one)[0].decode().splitlines()
+    start = lines.index("G0 X0 Y0 Z5")
+    assert [line.split()[0] for line in lines[start:]] == ["G0", "G1", "G2", "M30"]

@@ -38,9 +38,13 @@ _LONG = 60.0  # a dwell of a minute is no usual one [s]
 TURNING = {30: 1, 40: -1, 50: 0}  # of the spindle, by ten times M3, M4 and M5
 
 
-def set_feed(state: State, block: Block, findings: Findings, column: Callable[[int], int]) -> None:
-    """The feed mode and F of a block; F0, at the column of its word, is no feed for what follows. Raises WordFault for a negative F."""
+def set_feed(
+    state: State, block: Block, findings: Findings, column: Callable[[int], int], *, printer: bool
+) -> None:
+    """The feed mode and F of a block; F0, at the column of its word, is no feed for what follows, and on printers keeps
+    the feed before it. Raises WordFault for a negative F."""
     mode = _MODES[block.g["feed mode"]] if "feed mode" in block.g else state.feed_mode
+    state.fed |= state.feed > 0
     if mode != state.feed_mode:
         state.feed_mode, state.feed, state.feed_per_turn, state.feed_zero = mode, 0.0, 0.0, ""
     if "F" not in block.value:
@@ -49,6 +53,9 @@ def set_feed(state: State, block: Block, findings: Findings, column: Callable[[i
     text = "a feed must be positive; write the feed of the moves that follow, such as F1000"
     block.require(feed >= 0 and not (mode == "inverse time" and not feed), text, "F")
     if mode == "inverse time":
+        return
+    if printer and not feed and state.feed > 0:
+        findings.assume("F0 keeps the feed before it, as Marlin has it", block.line)
         return
     state.feed_zero = "" if feed else f" (F0 in line {block.line}, column {column(block.at['F'])}, is none)"
     state.feed_unit = state.unit
@@ -70,7 +77,8 @@ def take_default(
     """The machine's feed [mm/s], if it has one, or a printer's, for a feed move before the first F word."""
     whose = "the machine's feed_default" if default else "what Marlin and Klipper begin with"
     default = default or (PRINTER_FEED if printer else None)
-    if not default or state.strict or state.feed > 0 or state.motion == 0 or state.feed_mode != "per minute":
+    given = state.feed > 0 or state.fed or state.feed_mode != "per minute"
+    if not default or state.strict or state.motion == 0 or given:
         return
     state.feed, state.feed_unit = default * state.feed_factor, state.unit
     feed = default * SECONDS_PER_MINUTE / state.unit
@@ -92,7 +100,9 @@ def check_feed(state: State, block: Block) -> None:
         if state.spindle.surface_speed:
             return  # its feed depends on the diameter: `surface_feed`
         state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE
-    remedy = "write an F word on this line or before it, or feed_default into the machine file"
+    remedy = "write an F word on this line or before it" + ", or feed_default into the machine file" * (
+        not state.fed
+    )
     block.require(state.feed > 0, f"{name} moves without a feed{state.feed_zero}; {remedy}")
 
 
@@ -106,10 +116,15 @@ def _surface_speed(state: State) -> float:
     return state.spindle.speed * (_MM_PER_FOOT if state.unit != 1.0 else _MM_PER_METRE)
 
 
+def _surface_turns(state: State, radius: float) -> float:
+    """Speed of the spindle [1/min] at a radius [mm]; inf on the axis, if it has no bound."""
+    turns = _surface_speed(state) / (2.0 * math.pi * abs(radius)) if radius else math.inf
+    return min(turns, state.spindle.speed_max or math.inf)
+
+
 def surface_feed(state: State, radius: float, word: int) -> float:
     """Feed [mm/s] at a radius [mm]. Raises WordFault on the axis, if the speed has no bound."""
-    turns = _surface_speed(state) / (2.0 * math.pi * abs(radius)) if radius else math.inf
-    turns = min(turns, state.spindle.speed_max or math.inf)
+    turns = _surface_turns(state, radius)
     if math.isinf(turns):
         move = "a move to the spindle's axis under a constant surface speed (G96) without a largest speed"
         raise WordFault(word, f"{move} has no feed; write G50 S, or D beside G96")
@@ -143,10 +158,11 @@ def feed_of_time(state: State, block: Block, length: float, findings: Findings) 
         findings.assume(text, block.line, block.at["F"])
 
 
-def events(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
+def events(state: State, table: BlockTable, block: Block, findings: Findings, *, printer: bool) -> None:
     """Keep S, T and the codes that a control passes on, and what they set. Raises WordFault."""
     line = block.line
-    if "S" in block.value and (block.g.get("one-shot") != _DWELL or block.has("PXU")):
+    timed = block.g.get("one-shot") == _DWELL and (printer or not block.has("PXU"))
+    if "S" in block.value and not timed:
         text = "a spindle speed must not be negative; write M4 to turn the other way"
         block.require(block.value["S"] >= 0, text, "S")
         table.add_event("S", block.value["S"], line)
@@ -181,13 +197,25 @@ def events(state: State, table: BlockTable, block: Block, findings: Findings) ->
             table.add_event("M", block.m[group] / 10, line)
     state.spindle.turning = TURNING.get(block.m.get("spindle", -1), state.spindle.turning)
     if "spindle mode" in block.g:
-        surface = state.spindle.surface_speed = block.g["spindle mode"] == 960
+        surface = block.g["spindle mode"] == 960
         text = "G96 needs the surface speed as an S word"
         block.require(not surface or "S" in block.value, text, "spindle mode")
+        if not surface and state.spindle.surface_speed and "S" not in block.value:
+            _keep_speed(state, block, findings)
+        state.spindle.surface_speed = surface
         state.spindle.speed_max = abs(block.value.get("D", 0.0))
     for code in block.g.values():
         if code in codes.G_EVENTS:
             table.add_event("G", code / 10, line)
+
+
+def _keep_speed(state: State, block: Block, findings: Findings) -> None:
+    """G97 without S behind G96: the spindle keeps the speed that it has. Raises WordFault where that has no bound."""
+    turns = _surface_turns(state, float(state.programmed()[0]))
+    text = "G97 on the spindle's axis needs its speed as an S word"
+    block.require(math.isfinite(turns), text, "spindle mode")
+    state.spindle.speed = turns
+    findings.assume(f"G97 without S: the spindle keeps its speed of {turns:.0f} 1/min", block.line)
 
 
 def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, findings: Findings) -> None:
@@ -197,7 +225,10 @@ def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, 
             block.value["P"], block.at["P"] = block.value.pop(letter), block.at[letter]
             ignored.used(letter)
     seconds = block.value.get("P")
-    if seconds is not None and ignored.printer:
+    if seconds is not None and "S" in block.value and ignored.printer:
+        seconds = block.value["S"]
+        findings.assume("of S and P of G4 S counts, as Marlin has it", block.line)
+    elif seconds is not None and ignored.printer:
         seconds *= MILLISECOND
         findings.note("G4 P is in milliseconds, as 3-D printers have it", block.line)
     elif seconds is None and not ignored.strict and (ignored.printer or "S" in block.value):
@@ -215,14 +246,6 @@ def assume_seconds(state: State, block: Block, seconds: float, findings: Finding
     if seconds >= _LONG and not state.seconds_meant:
         text = f"a dwell of {seconds:g} s: read in seconds, as LinuxCNC and grbl have it; in ms: --dialect fanuc, or marlin"
         findings.assume(text, block.line, block.at.get("P", block.motion_word()))
-
-
-def assume_rapids(table: BlockTable, ignored: IgnoredWords, findings: Findings) -> None:
-    """Say it if G0 of a printer, which runs it at F, is planned as a rapid."""
-    rapid = table.block.kind[: table.blocks] == Kind.RAPID
-    if ignored.printer and rapid.any():
-        text = "G0 is planned at the limits of the axes; 3-D printers run it at F"
-        findings.assume(text, int(table.block.line[rapid.argmax()]))
 
 
 def path_control(state: State, block: Block, ignored: IgnoredWords, findings: Findings) -> None:

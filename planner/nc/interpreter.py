@@ -104,7 +104,6 @@ class Interpreter:
                 self.mover.cutter.fix()  # the last move, if the program just ends while compensation is on
             except CutterFault as fault:
                 self.findings.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
-        auxiliary.assume_rapids(self.table, self.ignored, self.findings)
         limits = self.limits.throughout(self.table, self.machine, self.findings)
         read = self.table.finish(self.source, self.notes, frames, self.reading, self.state.letters)
         read = dataclasses.replace(read, limits=limits)
@@ -240,9 +239,10 @@ class Interpreter:
         mover.check_offsets(self.state, block, compensated=self.mover.cutter is not None)
         self.state.numbers |= {c: block.value[c] for c in block.value.keys() & {"D", "H"}}
         assert self._words is not None
-        auxiliary.set_feed(self.state, block, self.findings, self._words.column)
+        printer = self.ignored.printer
+        auxiliary.set_feed(self.state, block, self.findings, self._words.column, printer=printer)
         self._timed |= self.state.feed_mode == "inverse time"
-        auxiliary.events(self.state, self.table, block, self.findings)
+        auxiliary.events(self.state, self.table, block, self.findings, printer=printer)
         if block.g.get("one-shot") == 40:
             auxiliary.dwell(self.state, self.table, block, self.ignored, self.findings)
         self._modes(block)

@@ -267,6 +267,8 @@ class Mover:
                 state.plane_known = True
                 text = "no G17, G18 or G19 before the first arc: G17; a Fanuc control starts with what is set in it"
                 self.findings.assume(text, block.line, block.motion_word())
+            text = "P of an arc is how often it turns here, more circles in Marlin, and nothing in Klipper; write them out"
+            block.require(not self.ignored.printer or block.value.get("P", 1.0) <= 1.0, text, "P")
             arc, normal = moves.arc(state, block, target)
             length = moves.arc_length(state.position, target, arc, normal)
             if abs(arc.sweep) <= FULL_TURN:

@@ -174,6 +174,7 @@ def execute(
         prints |= is_printer(words, extruder=extruder)
     if prints:
         interpreter.ignored.read_printer()
+        words.value[words.find("G", 0.0)] = 1.0  # G0 runs at F there
     if not siemens and not reading.strict and (units := detect.units(words)):
         text = "G70 and G71 without the words of a cycle are inch and mm, as in ISO 6983 and Mach3"
         findings.assume(text, int(words.line[words.row(units[0])]))

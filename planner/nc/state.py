@@ -115,6 +115,7 @@ class State:
     feed_mode: FeedMode = "per minute"
     feed_per_turn: float = 0.0  # F of G95 [mm]
     feed_zero: str = ""  # where F0 stands, while no other F has come
+    fed: bool = False  # a feed has been in force
     feed_unit: float = 1.0  # mm per programmed length unit when the feed was given
     spindle: Spindle = field(default_factory=Spindle)
     path_control: PathControl = PathControl.BLEND

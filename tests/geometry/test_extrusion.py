@@ -31,8 +31,8 @@ def test_with_a_constant_ratio_the_limit_is_a_feed() -> None:
 
 
 def test_rapids_and_travel_have_no_limit_where_nothing_is_fed() -> None:
-    path = laid_out("G0 X10\nG1 X20 F6000\nG0 X30 E1\n")
-    assert path.feed == pytest.approx([np.inf, 100.0, V / 0.1])
+    path = laid_out("G0 X10 F6000\nG28\nG0 X10 E1\n")
+    assert path.feed == pytest.approx([100.0, np.inf, V / 0.1])
 
 
 @pytest.mark.shows("extruder", "exact: closed forms from rest to rest")

@@ -16,6 +16,7 @@ from planner.base.errors import InputError
 from planner.cli import app
 from planner.machine import Machine
 from planner.nc.info import describe
+from planner.nc.program import Kind
 from planner.nc.reader import interpret, parse_program
 from planner.nc.reading import Reading
 from planner.report.summary import info_summary
@@ -112,12 +113,16 @@ def test_a_program_without_assumptions_is_called_supported(tmp_path: Path) -> No
     assert info_summary(describe(parse_program(job.read_bytes()), lines=3))["assumptions"] == []
 
 
-def test_a_printer_runs_its_rapids_at_f() -> None:
-    head = "G21\nM83\nG1 X5 F600\n"
-    (said,) = parse_program(head + "G0 X9\nG0 X12\n", BARE).assumptions
-    assert said.startswith("line 4: G0 is planned at the limits of the axes")
-    assert not parse_program(head + "G1 X9\n", BARE).assumptions
-    assert not parse_program("G21\nG1 X5 F600\nG0 X9\n", BARE).assumptions
+def test_a_printer_runs_g0_at_f() -> None:
+    """Marlin, Klipper and RepRapFirmware know no other rapid; slicers write G0 F9000 for a travel at 150 mm/s."""
+    text = "G21\nM83\nG0 X5 F600\nG1 X6\nG0 X9 Y1\nX10\nG0 F1200\nX12\n"
+    found = parse_program(text, BARE)
+    assert found.kind.tolist() == [Kind.LINE] * 5
+    assert found.feed.tolist() == [10.0] * 4 + [20.0]
+    assert not found.assumptions
+    assert parse_program(text.replace("M83\n", ""), BARE).kind.tolist() == [0, 1, 0, 0, 0]
+    homed = parse_program("M83\nG28\nG0 X5 F600\n", BARE)
+    assert homed.kind.tolist() == [Kind.RAPID, Kind.LINE]
 
 
 def test_the_plane_of_a_fanuc_mill_is_said_by_the_program() -> None:

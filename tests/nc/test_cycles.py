@@ -146,6 +146,7 @@ REFUSED = [
     ("S0 G95 F1 G1 X5", 3, "needs a spindle speed"),
     ("G96 S30\nG95 F1 G1 X0", 4, "without a largest speed"),
     ("G96", 3, "as an S word"),
+    ("G96 S30\nG0 X0\nG97", 5, "needs its speed as an S word"),
     ("G94 F1 G93\nG94 G1 X5", 3, "same group"),
     ("M66 P1 L3 Q5", 3, "waits for an input"),
     ("M62", 3, "needs the words P"),
@@ -160,6 +161,24 @@ def test_refused(text: str, line: int, part: str) -> None:
         parse_program(HEAD + text + "\nM2\n")
     assert caught.value.line == line
     assert part in caught.value.message
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G21 G90 G18\nG0 X20 Z2\nM3\nG95 F0.2\nG96 S100 D3000\nG1 Z0\nG97\nZ-9\nX40\nS600\nZ-12\nM2\n",
+        "O1\nG21 G99\nT0909\nG50 S3000\nG96 S100 M3\nG0 X40. Z2.\nG1 Z0 F.2\nG97\nZ-9.\nX80.\nG97 S600\nZ-12.\nM30\n",
+        "G18 G90 G71 DIAMON\nG0 X40 Z2\nLIMS=3000\nG96 S100 M3\nG1 Z0 F0.2\nG97\nZ-9\nX80\nS600\nZ-12\nM30\n",
+    ],
+    ids=["linuxcnc", "fanuc", "siemens"],
+)
+def test_the_spindle_keeps_its_speed_where_g97_has_none(text: str) -> None:
+    """100 m/min at a diameter of 40 mm, by Fanuc's and Siemens' manuals; S100 of G96 is no 100 1/min."""
+    program = parse_program(text)
+    speed = 100e3 / (np.pi * 40.0)
+    feeds = program.feed[program.kind == Kind.LINE] * 60.0
+    np.testing.assert_allclose(feeds, 0.2 * np.array([speed, speed, speed, 600.0]))
+    assert any("G97 without S: the spindle keeps its speed of 796" in said for said in program.assumptions)
 
 
 def test_outputs_are_events() -> None:

@@ -59,8 +59,8 @@ HARMLESS = [
 
 @pytest.mark.parametrize(("line", "note"), HARMLESS, ids=lambda text: str(text)[:25])
 def test_what_moves_nothing_is_counted(line: str, note: str | None) -> None:
-    program = parse_program(f"G21 G0 X1\n{line}\nG1 X2 Y3 F600")
-    plain = parse_program("G21 G0 X1\n" + "\n" * (line.count("\n") + 1) + "G1 X2 Y3 F600")
+    program = parse_program(f"G21 G1 X1 F600\n{line}\nG1 X2 Y3 F600")
+    plain = parse_program("G21 G1 X1 F600\n" + "\n" * (line.count("\n") + 1) + "G1 X2 Y3 F600")
     assert same_motion(program, plain)
     found = [said for said in program.notes if note is not None and note in said]
     assert len(found) == (note is not None), program.notes

@@ -95,7 +95,7 @@ def test_a_start_macro_homes_lifts_and_purges(voron: Machine, bed: int, dwell: f
     assert program.dwell.sum() == pytest.approx(dwell)
     # E 15 and back by 1 in absolute places, then M83 of the macro: steps of 1 and 2
     assert program.extruded[program.extruded != 0.0] == pytest.approx([15.0, -1.0, 1.0, 2.0])
-    assert program.feed[program.kind == Kind.LINE] * 60 == pytest.approx([3000, 6000, 1500, 3000, 3000])
+    assert program.feed[program.kind == Kind.LINE] * 60 == pytest.approx([3600, 3000, 6000, 1500, 3000, 3000])
     assert list(program.line) == [2] * (len(program) - 3) + [3, 4, 5]
     assert program.expansion is not None
     assert dict(program.expansion.calls) == {"PRINT_START": 1, "G32": 1, "PURGE": 1}

@@ -161,3 +161,12 @@ def test_the_seconds_of_a_dwell_are_no_speed() -> None:
     assert not [event for event in program.events if event.text[0] == "S"]
     spoken = parse_program("G21 F600\nG1 X5\nG4 P2 S900\nG1 X10\n")
     assert [event.text for event in spoken.events] == ["S900"]
+
+
+def test_turns_of_an_arc_are_refused_which_firmwares_count_otherwise() -> None:
+    """Marlin adds P circles where it is built to, Klipper passes over P; P1 is Bambu's, one turn of a spiral lift."""
+    lift = parse_program("G21 F600\nM83\nG2 X5 Y0 Z1 I2.5 J0 P1\n")
+    assert np.abs(lift.arc_sweep).tolist() == pytest.approx([np.pi])
+    with pytest.raises(InputError, match="more circles in Marlin") as fault:
+        parse_program("G21 F600\nM83\nG2 X5 Y0 I2.5 J0 P2 E1\n")
+    assert fault.value.line == 3

@@ -59,7 +59,7 @@ def test_values_of_settings_are_checked() -> None:
 
 def test_extruder_words_are_left_out_if_the_user_says_so() -> None:
     text = "M82\nG21 G92 E0\nG1 X1 Y1 E0.5 F600\nG1 E-2 F2400\nG1 X2 E1e-05\nG0 X3"
-    plain = parse_program("\nG21\nG1 X1 Y1 F600\nG1 F2400\nG1 X2\nG0 X3")
+    plain = parse_program("\nG21\nG1 X1 Y1 F600\nG1 F2400\nG1 X2\nX3")
     program = parse_program(text, reading=NO_EXTRUDER)
     assert same_motion(program, plain)
     assert any(note.startswith("4 E words: left out (--extruder ignore)") for note in program.notes)
@@ -76,6 +76,9 @@ def test_dwells_of_printers_are_in_milliseconds() -> None:
     assert parse_program("M83\nG4 P1500\nG4 S2\nG4").dwell.tolist() == [1.5, 2.0, 0.0]
     assert parse_program("G4 P1.5\nG4 S2").dwell.tolist() == [1.5, 2.0]
     assert parse_program("M83\nG4").kind.tolist() == [Kind.STOP]
+    both = parse_program("M83\nG4 P500 S2")
+    assert both.dwell.tolist() == [2.0]
+    assert [event.text for event in both.events] == ["M83"]
 
 
 def test_the_machine_may_have_a_feed_for_moves_before_the_first() -> None:
@@ -86,6 +89,17 @@ def test_the_machine_may_have_a_feed_for_moves_before_the_first() -> None:
     for given, reading in ((machine(), Reading()), (machine(feed_default=1.0), STRICT)):
         with pytest.raises(InputError, match=r"without a feed.*feed_default"):
             parse_program(text, given, reading)
+
+
+def test_a_feed_of_zero_takes_the_feed_away_and_on_printers_keeps_it() -> None:
+    """LinuxCNC and grbl refuse the next feed move; Marlin passes over F0."""
+    with_default = machine(feed_default=12.7)
+    for text in ("G21 G1 X1 F60\nX2 F0", "G21 G1 X1 F60\nG0 X2 F0\nG1 X3", "G21 G1 X1 F60\nG93\nG94\nX2"):
+        with pytest.raises(InputError, match=r"without a feed.*write an F word on this line or before it$"):
+            parse_program(text, with_default)
+    kept = parse_program("M83\nG21 G1 X1 F60\nX2 F0\nX3", with_default)
+    assert kept.feed.tolist() == [1.0, 1.0, 1.0]
+    assert any("F0 keeps the feed" in text for text in kept.assumptions)
 
 
 # --- arc centres ----------------------------------------------------------------------------------------------------------

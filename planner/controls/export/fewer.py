@@ -100,7 +100,7 @@ class _Writer:
                 after, arcs, run = after + moves, arcs + bent, []
             if row is None:
                 break
-            straight = row.moves and row.motion == LINE
+            straight = row.moves and row.motion == LINE and not row.at_feed
             before += straight
             if why == "":
                 run.append(row)
@@ -131,8 +131,8 @@ class _Writer:
             (row.others or set(row.g()) - {LINE} or not alone, "other words or a comment beside them"),
         ):
             if holds:
-                return None if row.motion == 0 else why
-        return None if row.motion == 0 or program.kind[first] != Kind.LINE else ""
+                return None if row.motion == 0 or row.at_feed else why
+        return None if row.motion == 0 or row.at_feed or program.kind[first] != Kind.LINE else ""
 
     def _replace(self, run: list[Row]) -> tuple[int, int]:
         """Write a run anew; returns the numbers of its moves and of its arcs."""

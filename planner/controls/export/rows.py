@@ -40,6 +40,7 @@ LENGTHS = frozenset((431, 432))  # whose axis words are lengths of tools
 COMPENSATION_ON, COMPENSATION_OFF = frozenset((410, 411, 420, 421)), 400
 ENDS = frozenset((20, 300))  # M2 and M30, in tenths
 _TOOL_CHANGE = 6
+_LINE = 10  # G1, in tenths
 _ROUGH_CYCLES = frozenset((730, 810, 820, 830, 850, 890))  # that neither stop nor turn the spindle
 _FLAG = re.compile(r"([A-FH-LP-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)|)[ \t]*", re.IGNORECASE)
 _FLAGS = re.compile(f"(?:{_FLAG.pattern})+", re.IGNORECASE)
@@ -89,6 +90,7 @@ class Row:
     radius: bool = False  # cutter radius compensation acts on it, or ends with it
     placed: frozenset[str] = frozenset()  # letters of axes whose place words before it have told
     plain: bool = False  # chords may replace what it moves
+    at_feed: bool = False  # its G0 runs at F, as printers run it: the motion code is that of G1
 
     def g(self) -> list[int]:
         """Its G codes in tenths."""
@@ -287,16 +289,18 @@ class _Follower:
         elif one_shot == G53:
             row.motion = self.motion
             self.placed -= named
-        elif one_shot == -1 and LENGTHS.isdisjoint(g) and (named or row.feeds or self._turns_round(row, g)):
-            row.motion = self.motion
+        elif one_shot == -1 and LENGTHS.isdisjoint(g) and (named or row.feeds or self._bends(row, g)):
+            row.at_feed = self.motion == 0 and Kind.LINE in self.program.kind[row.first : row.last]
+            row.motion = _LINE if row.at_feed else self.motion
             if row.moves:
                 row.plain = self._is_plain(row, named)
             self.placed |= self._told(row, named) if self.absolute else frozenset()
 
-    def _turns_round(self, row: Row, g: list[int]) -> bool:
-        """Whether it is a full circle, which needs no coordinate."""
+    def _bends(self, row: Row, g: list[int]) -> bool:
+        """Whether it moves without a coordinate: on a full circle, or along the NURBS of the lines behind it."""
         said = not codes.ARCS.isdisjoint(g) or any(word.letter in "IJKR" for word in row.words)
-        return self.motion in codes.ARCS and said
+        along = self.motion in codes.SPLINES and bool(self.simple[row.first : row.last].any())
+        return along or (self.motion in codes.ARCS and said)
 
     def _told(self, row: Row, named: frozenset[str]) -> frozenset[str]:
         """Axes of which a row's words tell where they are after it: not a cycle's depth, it comes back."""

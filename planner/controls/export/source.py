@@ -21,6 +21,7 @@ from planner.nc.writer import FEED_MIN, program_text, round_down
 from planner.planning.job.plan import Plan
 
 CURVE = "G6.2"  # of a curve without a text, which no control is given: chords stand for it
+WRITTEN = "<written>"  # the name of a text that was written for a program
 SAME_PLACE = 1e-6  # of an end point that was written with seven decimals and read back [mm]
 
 
@@ -65,13 +66,15 @@ def _same(text: bytes, plan: Plan, reading: Reading, how: str) -> Program:
     """The program that the text reads as. Raises InputError if that is not the plan's program."""
     program = plan.program
     said = f"the program{how} does not read back"
+    # the ending of the file says of its own text whose language that is, of no other
+    name = WRITTEN if how else program.source
     try:
-        read = parse_program(text, plan.machine, reading, source=program.source)
+        read = parse_program(text, plan.machine, reading, source=name)
     except InputError as fault:
         raise InputError(f"{said}: {fault.message}", source=program.source) from None
     if not same_places(read, program):
         raise InputError(f"{said} as the one that was planned", source=program.source)
-    return read
+    return dataclasses.replace(read, source=program.source)
 
 
 def same_places(one: Program, other: Program) -> bool:
@@ -160,6 +163,8 @@ def _row_why_not(row: Row, source: Source, control: Control) -> str:
             return f"{word} is not known"
         if of_code is None and not control.one_command and word.letter not in control.letters:
             return f"{word}: letter {word.letter} is not known"
+    if row.at_feed and not control.rapid_feed:
+        return "G0, which printers run at F"
     if G4 in row.g():
         p = row.value("P")
         lasts = 0.0 if p is None else p.value * (MILLISECOND if control.milliseconds else 1.0)

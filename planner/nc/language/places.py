@@ -50,6 +50,7 @@ class Places:
         self.interpreter = interpreter
         self.place, self.absolute = np.zeros(3), True
         self._angle = 0.0  # of polar coordinates [degrees]
+        self._stepped = False  # the last radius was one after G91
         self._level: float | None = None  # before the drilling cycle in force [mm]
         # the tilted plane in force, and with it frames that tilt; where rows have come to in it
         self.swivelled = self._tilt = np.eye(3), np.zeros(3)
@@ -137,17 +138,22 @@ class Places:
         return target
 
     def _polar_target(self, pole: complex, given: dict[int, float]) -> FloatArray:
-        """A radius and an angle about a pole in the plane, each as it is where no word gives it."""
+        """A radius and an angle about a pole in the plane, each as it is where no word gives it; a radius after
+        G91 is about where the tool is. Raises ValueError."""
         first, second = (AXES[axis] for axis in IN_PLANE[self.normal])
-        here = in_plane(self.place, self.normal) - pole
-        if abs(here) > STANDS:
-            self._angle = math.degrees(cmath.phase(here))
-        radius, angle = abs(here), self._angle
+        here, steps = in_plane(self.place, self.normal), first in given and not self.absolute
+        if second in given and first not in given and self._stepped:
+            raise ValueError(
+                "an angle alone behind a radius after G91 has no known centre; write the radius, too"
+            )
+        if abs(here - pole) > STANDS and not self._stepped:
+            self._angle = math.degrees(cmath.phase(here - pole))
+        place, radius, angle = (here if steps else pole), abs(here - pole), self._angle
         if first in given:
-            radius = given[first] + (0.0 if self.absolute else radius)
+            radius, self._stepped = given[first], steps
         if second in given:  # the angle is no length
             angle = given[second] * self._per_mm(second) + (0.0 if self.absolute else angle)
-        place, target = pole, self.place.copy()
+        target = self.place.copy()
         if first in given or second in given:
             self._angle = angle
             place += radius * complex(*turned(angle, 2)[:2, 0])

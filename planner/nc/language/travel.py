@@ -61,7 +61,7 @@ class Travel(RowsThrough):
         """Coordinates are a radius and an angle about a pole in the plane [mm] from now on; None ends it."""
         if pole is not None:
             self._begin()
-        self.polar = pole
+        self.polar, self._stepped = pole, False
 
     def compensate(self, side: int, assume: Callable[[str], None]) -> None:
         """Switch compensation on, to the left (1) or right (-1) of the path, or off (0); `assume` keeps what

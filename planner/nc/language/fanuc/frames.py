@@ -3,7 +3,8 @@ the makers of their rows.
 
 A programmed point p is at R S M p: M is the mirror image (G51.1; G101 of Haas), S the scale (G51), R the
 rotation (G68), each about its centre, that of the rotation mirrored and scaled as the points are. After G16
-the words of the plane are a radius and an angle about the work zero, after G91 G16 about where the tool is.
+the words of the plane are a radius and an angle about the work zero, after G91 G16 about where the tool is; a
+radius after G91 is always about where the tool is.
 
     G12 G13    (Haas) a round pocket about where the tool is: to Z at F, on a half circle out to I less the tool's radius and once
                round, with K on by Q until K, and on a half circle back. L times after G91, each Z deeper

@@ -43,6 +43,10 @@ CASES = {
         f"G1 X[{10 * COSINE:.15f}] Y5\nX-5 Y[{10 * COSINE:.15f}]\nX-10 Y0\nX1 Y1",
     ),
     "polar about the tool": ("G0 X3. Y4.\nG91 G16\nG1 X5. Y90.\nG90 G15\nX0 Y0", "G0 X3 Y4\nG1 X3 Y9\nX0 Y0"),
+    "a polar radius in steps": (
+        "G16\nG1 X10. Y90.\nG91 X3. Y-90.\nX2. Y90.\nX1.\nG90 X5. Y0\nG91 Y90.\nG90 G15\nX1. Y1.",
+        "G1 X0 Y10\nX3 Y10\nX3 Y12\nX3 Y13\nX5 Y0\nX0 Y5\nX1 Y1",
+    ),
     "a bolt circle": (
         "G16 G81 X10. Y0 Z-5. R2.\nG91 Y90. K3\nG90 G80 G15\nG0 X0",
         "G81 X10 Y0 Z-5 R2\nX0 Y10\nX-10 Y0\nX0 Y-10\nG80\nG0 X0",
@@ -147,6 +151,7 @@ def test_as_written_out(name: str, unit: str) -> None:
         ("G1 X5. ,R9.\nY5.", "takes more of a move"),
         ("G1 X5. Y5. ,A30.", "one of X and Y"),
         ("G70 I5. L4", "a drilling cycle in force"),
+        ("G16\nG1 X5. Y90.\nG91 X1. Y10.\nY20.", "no known centre"),
     ],
 )
 def test_refused(text: str, said: str) -> None:

@@ -31,27 +31,6 @@ def entry_length(V: FloatArray, a: FloatArray, J: FloatArray) -> FloatArray:
     return 2 * V**2 / (3 * entry_acceleration(V, a, J))
 
 
-def corner_error(
-    overlap: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray
-) -> FloatArray:
-    """(n,) by how much the vertex is missed [mm] (eq. 14).
-
-    overlap     : (n,) Tk [s], 0 <= Tk <= Td
-    V, sin_half : (n,) speed of the pulses, the geometric mean of two [mm/s]; sine of half the turning angle [-]
-    T1, T2      : (n,) filters [s]
-    """
-    cubic = overlap**3 / (24 * T1 * T2)
-    square = (4 * T2**2 - 6 * T2 * overlap + 3 * overlap**2) / (12 * T1)
-    return np.where(overlap <= 2 * T2, cubic, square) * V * sin_half
-
-
-def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
-    """(n,) how far inside circles of radius `rho` (n,) [mm] the point runs at v (n,) [mm/s] behind filters T1, T2 (n,)
-    [s]: exact [mm], rho [1 - sinc(v T1/2rho) sinc(v T2/2rho)]."""
-    lag = v / (2.0 * np.pi * rho)  # np.sinc(x) is sin(pi x)/(pi x)
-    return rho * (1.0 - np.sinc(lag * T1) * np.sinc(lag * T2))
-
-
 def residual_vibration(
     t: FloatArray, acceleration: FloatArray, frequency: float, damping: float
 ) -> FloatArray:

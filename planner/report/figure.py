@@ -36,8 +36,12 @@ COLOURS = (
 GREY, LIGHT = "#606060", "#c4c4c4"
 INK, DIM = "#1d2430", "#667085"  # of text, and of what is beside it, on light ground
 PRICES = (0.02, "#f6c667"), (0.5, "#e8743b"), (1.0, "#7a1f5c")  # share of the dearest [-], and its colour
-# Cividis, from low to high, where it has to be seen against a light or a dark page: without its bright or its dark end,
-# at equal steps.
+# Cividis, from low to high, at ten equal steps.
+CIVIDIS = (
+    "#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838",
+)  # fmt: skip
+# The same where they have to be seen against a light or a dark page: without its bright or its dark end, at
+# equal steps.
 LOW_TO_HIGH = {
     "light": ("#00224e", "#3b496c", "#77766f", "#ad9650", "#d9a900"),
     "dark": ("#4a7ccc", "#6f86b0", "#9a978f", "#cdb969", "#fee838"),

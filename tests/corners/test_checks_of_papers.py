@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles import corner_error
 from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 from scipy.special import ellipe, ellipk
 
+from planner.baselines.fir.rules import corner_error
 from planner.motion.filters import Filters
 
 V, T1, T2 = 100.0, 0.050, 0.030

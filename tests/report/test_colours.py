@@ -7,9 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from planner.report.figure import COLOURS, GREY, LIGHT, LOW_TO_HIGH
+from planner.report.figure import CIVIDIS, COLOURS, GREY, LIGHT, LOW_TO_HIGH
 
-CIVIDIS = ("#00224e", "#3b496c", "#707173", "#a59c74", "#e1cc55")  # from low to high, at equal steps
 SEEN = {
     "by most": np.eye(3),
     "without green cones": np.array(
@@ -64,7 +63,7 @@ def test_limits_and_methods_are_told_apart(seen: str) -> None:
 
 
 @pytest.mark.parametrize("seen", SEEN)
-@pytest.mark.parametrize("scale", [CIVIDIS, *LOW_TO_HIGH.values()], ids=["Cividis", *LOW_TO_HIGH])
+@pytest.mark.parametrize("scale", [CIVIDIS[::2], *LOW_TO_HIGH.values()], ids=["Cividis", *LOW_TO_HIGH])
 def test_more_is_lighter_to_everybody(seen: str, scale: tuple[str, ...]) -> None:
     found = np.array([lab(colour, SEEN[seen]) for colour in scale])
     assert np.all(np.diff(found[:, 0]) > 0.0)

@@ -141,6 +141,13 @@ def _first_plan(guide: ChordGuide, machine: Machine, top: FloatArray) -> ChordSp
     return ChordSpeeds(guide=guide, v=np.minimum(v, feeds_held(guide, T1, T2)), T1=T1, T2=T2, margin=margin)
 
 
+def circle_error(rho: FloatArray, v: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
+    """(n,) how far inside circles of radius `rho` (n,) [mm] the point runs at v (n,) [mm/s] behind filters T1, T2 (n,)
+    [s]: exact (module text) [mm]."""
+    lag = v / (2.0 * np.pi * rho)  # np.sinc(x) is sin(pi x)/(pi x)
+    return rho * (1.0 - np.sinc(lag * T1) * np.sinc(lag * T2))
+
+
 def v_eps(kappa: FloatArray, tol: FloatArray, T1: FloatArray, T2: FloatArray) -> FloatArray:
     """(n,) speed [mm/s] at which the error of filters T1, T2 (n,) [s] is `tol` (n,) [mm] at the curvature `kappa` (n,)
     [1/mm] (par. 24); inf if straight."""

@@ -60,6 +60,20 @@ from planner.machine import Machine
 LIMIT_ROUNDING = 1e-9
 
 
+def corner_error(
+    overlap: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray
+) -> FloatArray:
+    """(n,) by how much the vertex is missed [mm] (eq. 14).
+
+    overlap     : (n,) Tk [s], 0 <= Tk <= Td
+    V, sin_half : (n,) speed of the pulses, the geometric mean of two [mm/s]; sine of half the turning angle [-]
+    T1, T2      : (n,) filters [s]
+    """
+    cubic = overlap**3 / (24 * T1 * T2)
+    square = (4 * T2**2 - 6 * T2 * overlap + 3 * overlap**2) / (12 * T1)
+    return np.where(overlap <= 2 * T2, cubic, square) * V * sin_half
+
+
 def overlap_within(
     tol: FloatArray, V: FloatArray, sin_half: FloatArray, T1: FloatArray, T2: FloatArray, dt: float
 ) -> FloatArray:
@@ -68,8 +82,7 @@ def overlap_within(
     At the middle the acceleration is 2 V h(Tk/2) s, the chord over a period leaves the motion by dt^2/8 of
     it: reckoned with the longer overlap that the whole tolerance would allow, and half the tolerance at most.
 
-    V, sin_half : (n,) speed of the pulses, the geometric mean of two [mm/s]; sine of half the turning angle [-]
-    T1, T2      : (n,) filters [s]
+    V, sin_half, T1, T2 : (n,) as of `corner_error`
     """
     whole = overlap_time(tol, V, sin_half, T1, T2)
     bend = 2 * V * sin_half * np.minimum(whole / 2 / T2, 1.0) / T1

@@ -7,9 +7,8 @@ import pytest
 from guides import corner, guide_through, machine_of, overlapping
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from oracles import corner_error
 
-from planner.baselines.fir.rules import overlap_beside, overlap_within, overlap_within_limits
+from planner.baselines.fir.rules import corner_error, overlap_beside, overlap_within, overlap_within_limits
 from planner.baselines.fir.slow_down import make
 from planner.corners.fir import overlap_time
 from planner.planning.methods.fir import motion_of

@@ -12,11 +12,10 @@ import pytest
 from curves import circle, curve_named, strong, wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import circle_error
 
 from benchmarks.jobs import problems
 from planner.baselines.fir.chord_guide import ChordGuide
-from planner.baselines.fir.chord_speeds import filter_lengths, two_nodes, v_eps, v_ph, v_sc
+from planner.baselines.fir.chord_speeds import circle_error, filter_lengths, two_nodes, v_eps, v_ph, v_sc
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Axis, Machine

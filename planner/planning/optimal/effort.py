@@ -20,8 +20,8 @@ from planner.planning.optimal.order import Order
 
 # Interpolation error of the axis accelerations on the coarsest grid [share of the limit].
 COARSE = 3.2e-2
-# The same of the motion that a search begins with: from a grid twelve times as fine it finds the same times, to 1e-5 on the
-# mean of 70 jobs, and 169,208 short blocks take a third more computing for it.
+# The same of the motion that a search begins with: a finer grid finds the same times and computes longer
+# (`python -m benchmarks.cost.long_jobs stellabee1`).
 BEGINNING = 0.1
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.errors import InputError
 from planner.base.sizes import SIZES
 from planner.base.units import MM_PER_INCH
 from planner.machine import ROTARY_AXES
@@ -30,8 +31,8 @@ UNITS = {"mm": 1.0, "inch": MM_PER_INCH}
 
 
 def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> None:
-    """Write the three files into an existing directory, in mm or inch. Raises InputError for a motion that is not from rest
-    to rest."""
+    """Write the three files into an existing directory. Raises InputError for another unit than mm or inch, and for a motion
+    that is not from rest to rest."""
     require_rest(trajectory.from_rest_to_rest)
     scale = scale_of(trajectory, unit)
     with (directory / "setpoints.txt").open("w", encoding="ascii") as file:
@@ -44,7 +45,10 @@ def write_stream(directory: Path, trajectory: Trajectory, unit: str = "mm") -> N
 
 
 def scale_of(trajectory: Trajectory, unit: str) -> FloatArray:
-    """(A,) units of a file, mm or inch and degrees, per unit of the positions."""
+    """(A,) units of a file, mm or inch and degrees, per unit of the positions. Raises InputError for
+    others."""
+    if unit not in UNITS:
+        raise InputError(f"no unit '{unit}'; there are {', '.join(UNITS)}")
     rotary = [axis in ROTARY_AXES for axis in trajectory.axes]
     return np.where(rotary, trajectory.in_degrees, 1.0 / UNITS[unit])
 

@@ -57,12 +57,15 @@ def write_table(directory: Path, trajectory: Trajectory, table: Table) -> tuple[
     """Write the files into an existing directory; returns the interpolation periods between two rows, and the
     largest distance found [mm].
 
-    Raises InputError for a distance that the cycle exceeds, a cycle that is no whole number of interpolation periods,
-    and as many names of joints as there are no axes; for a motion that is not from rest to rest too.
+    Raises InputError for another unit than mm or inch, a distance that is not above 0 or that the cycle exceeds, a cycle
+    that is no whole number of interpolation periods, and as many names of joints as there are no axes;
+    for a motion that is not from rest to rest too.
     """
     require_rest(trajectory.from_rest_to_rest)
     scale = scale_of(trajectory, table.unit)
     within = WITHIN if table.within is None else table.within
+    if not within > 0:
+        raise InputError(f"--within must be above 0 mm, found {within:g}")
     rotary = np.array([axis in ROTARY_AXES for axis in trajectory.axes])
     allowed = np.where(rotary, within * RAD_PER_DEG * trajectory.radius, within)
     straight = table.kind in STRAIGHT

@@ -148,3 +148,12 @@ def test_positions_alone_are_taken_as_from_rest_to_rest(tmp_path: Path, dt: floa
     assert np.abs(found.velocity[0]).max() > 1e-6
     write_table(tmp_path, found, Table())
     write_pulses(tmp_path / "pulses.csv", pulses_of(found, {"x": 400.0, "y": 400.0}), {})
+
+
+def test_what_cannot_be_is_refused(tmp_path: Path, motion: Trajectory) -> None:
+    """Also of a caller from Python: no distance is larger than one that is no number."""
+    for within in (0.0, float("nan")):
+        with pytest.raises(InputError, match="must be above 0"):
+            write_table(tmp_path, motion, Table(within=within))
+    with pytest.raises(InputError, match="no unit 'cm'"):
+        write_table(tmp_path, motion, Table(unit="cm"))

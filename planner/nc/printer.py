@@ -42,6 +42,7 @@ _ANY = frozenset((0, 1, 2, 3, 4, 5, 10, 11, 17, 18, 19, 20, 21, *range(52, 60), 
 _LEVELS = frozenset((
     0, 1, 12, *range(26, 36), 39, 42, 76, *range(80, 90), 130, 150, 212, 280, 375, 380, 383, 392, 425,
 ))  # fmt: skip
+_FEED_STAYS = ("G0", "G1")  # ... whose F is modal, too
 _BAMBU = 1000  # G2811, G9111 and others from here on, too
 _STOPPING = {"M0": 0, "M1": 10, "M2": 20, "M30": 300}
 _HOMING = ("G28", "G161", "G162")
@@ -157,6 +158,8 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
             return False
         ignored.count(what, name, block.line)
         block.stops = stops
+        if name in _FEED_STAYS and math.isfinite(given.get("f", math.nan)):  # for the moves behind it
+            block.value["F"], block.at["F"] = given["f"], word
     if code >= 0 and name[0] != "P":
         block.events.append((name[0], float(name[1:])))
     return True

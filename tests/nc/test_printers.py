@@ -155,6 +155,14 @@ def test_commands_that_are_no_moves(line: str, said: str) -> None:
     assert (program.kind == Kind.STOP).sum() == len(program) - 2
 
 
+def test_the_feed_of_a_move_to_a_switch_stays() -> None:
+    """RepRapFirmware's G1 with H is not planned; its F is modal all the same, and holds for what follows."""
+    program = parse_program("G21\nM83\nG1 X5 F6000\nG1 H1 Z-10 F300\nG1 X10\n")
+    assert program.feed[program.kind == Kind.LINE].tolist() == [100.0, 5.0]
+    with pytest.raises(InputError, match="positive"):
+        parse_program("G21\nM83\nG1 X5 F6000\nG1 H1 Z-10 F-300\nG1 X10\n")
+
+
 def test_the_seconds_of_a_dwell_are_no_speed() -> None:
     program = parse_program("G21 F600\nM83\nM106 S255\nG1 X5\nG4 S2\nG1 X10\n")
     assert program.dwell.tolist() == [0.0, 2.0, 0.0]

@@ -12,8 +12,9 @@ from planner.machine.user_limit import QUANTITIES
 TOLD, SLID = 6, 0.01
 PULL_AGAIN = 0.1  # so that what is searched once more hardly slides along itself [-]
 # Power of a share by which a law is lowered, by this at least [-] (what slides on is above it by some 1e-6
-# every time), and on so many steps beside; everywhere by that from a try on, as it slides from step to step.
-TIGHTER_BESIDE, LOWERED, BESIDE, EVERYWHERE = 1.5, 1e-5, 3, 2
+# every time), and on so many steps beside; everywhere from a try on, as it slides from step to step, by as much as
+# is asked for anywhere, at most by `ALL_BY`.
+TIGHTER_BESIDE, LOWERED, BESIDE, EVERYWHERE, ALL_BY = 1.5, 1e-5, 3, 2, 3e-4
 LOWERED_MOST = 0.2  # as what is far above its limit comes of a place where the motion hardly moves [-]
 JERK = QUANTITIES.index("jerk")
 
@@ -26,7 +27,7 @@ def tightened(over: FloatArray, number: int) -> FloatArray:
     for back in range(1, BESIDE + 1):
         more[back:] = np.maximum(more[back:], above[:-back])
         more[:-back] = np.maximum(more[:-back], above[back:])
-    return np.maximum(more, 1.0 + LOWERED * (above > 1.0).any(axis=0)) if number >= EVERYWHERE else more
+    return np.maximum(more, np.minimum(above.max(axis=0), 1.0 + ALL_BY)) if number >= EVERYWHERE else more
 
 
 def law_shares(run: TubeRun, cut: CutMotion | Guess, node: Array) -> FloatArray:

@@ -25,7 +25,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze, read_only
-from planner.base.errors import InputError
+from planner.base.errors import InputError, NotSolvedError
 from planner.base.search import nearest
 from planner.base.sizes import SIZES
 from planner.feedrate.sampling.path_samples import PathSamples
@@ -59,8 +59,14 @@ class TimeLaw:
 
 
 def law_of_solution(samples: PathSamples, solution: FeedrateSolution) -> TimeLaw:
-    """The time law of a solution of any order, dwells included. Raises NotSolvedError without a solution."""
+    """The time law of a solution of any order, dwells included. Raises NotSolvedError without a solution, and where one
+    interval leads from stop to stop, on which no point of the grid moves."""
     duration = solution.require().duration.copy()
+    if not np.isfinite(duration).all():
+        line = samples.path.toolpath.line[samples.segment[int(np.argmax(duration))]]
+        raise NotSolvedError(
+            f"line {line}: one interval of the grid leads from stop to stop; split it (planner.feedrate.grid.add_switching_points)"
+        )
     dwell = _dwells(samples)
     duration[samples.piece[1:] - 1] += dwell[1:]  # the last point of a piece stands still
     return TimeLaw(

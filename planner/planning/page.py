@@ -29,6 +29,7 @@ from planner.motion.timing import Motion, require_samples
 from planner.nc.extents import travel_faults
 from planner.nc.faults import require_none
 from planner.nc.program import Program
+from planner.planning.job.at_tip import LEFT_FREE_MOST, room_for_joints
 from planner.planning.job.by_run import RunsInTime, broken_runs, full_stops
 from planner.planning.job.choice import beside, faster, inside, not_in_step, passed, shown_time
 from planner.planning.job.job import Job
@@ -170,7 +171,19 @@ def job_of(program: Program, machine: Machine, tolerance: float | None, stages: 
     at_feed = float(np.sum(toolpath.length / toolpath.feed) + np.sum(toolpath.dwell))
     require_samples(at_feed, machine.dt)
     stages.tell("programmed feed", found=at_feed, segments=len(toolpath), dt=machine.dt)
-    return Job(program=program, machine=machine, toolpath=toolpath, stages=stages)
+    return _with_room(Job(program=program, machine=machine, toolpath=toolpath, stages=stages))
+
+
+def _with_room(job: Job) -> Job:
+    """The job with what the tip may leave its chords by taken off the tolerance (planning/job/at_tip.py); it is judged by all."""
+    machine, toolpath = job.real
+    off = room_for_joints(toolpath, machine)
+    if not off:
+        return job
+    tolerance = np.maximum(toolpath.tolerance - off, (1.0 - LEFT_FREE_MOST) * toolpath.tolerance)
+    return dataclasses.replace(
+        job, toolpath=dataclasses.replace(toolpath, tolerance=tolerance), judged=(machine, toolpath)
+    )
 
 
 def _filters_cost_time(best: Plan, job: Job, method: Method) -> bool:

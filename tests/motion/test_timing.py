@@ -13,10 +13,16 @@ from oracles import needs_ruckig
 from whole_plans import CORNERS, Solved, dense_motion, smooth_path, solve
 
 from benchmarks.jobs import problems
+from planner.base.errors import NotSolvedError
 from planner.base.point_to_point import PHASES, rest_to_rest_phases, rest_to_rest_times
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.grid import add_switching_points
+from planner.feedrate.reachability import Reachability
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
-from planner.motion.timing import Motion, law_of_moves, sample_motion
+from planner.motion.timing import Motion, law_of_moves, law_of_solution, sample_motion
 from planner.motion.trajectory import Trajectory
 from planner.nc.reader import parse_program
 from planner.planning.job.job import Job
@@ -30,6 +36,19 @@ JOBS = problems.all_jobs()
 @cache
 def solved_job(job: str, kind: str = "bezier") -> Solved:
     return solve(JOBS[job], MACHINE, kind)
+
+
+def test_an_interval_from_stop_to_stop_is_refused_with_its_line() -> None:
+    """No grid point of it moves: its duration is infinite, and splitting it is the remedy."""
+    toolpath = toolpath_from_program(parse_program("F6000\nG1 X10\nG4 P0.1\nX20\n", MACHINE), MACHINE)
+    samples = sample_path(round_corners(toolpath, MACHINE, BezierCorner()), MACHINE)
+    problem = feedrate_problem(samples, MACHINE)
+    solution = Reachability().solve(problem)
+    with pytest.raises(NotSolvedError, match="line 2: one interval"):
+        law_of_solution(samples, solution)
+    split = add_switching_points(samples, problem, solution, MACHINE)
+    law = law_of_solution(split, Reachability().solve(feedrate_problem(split, MACHINE)))
+    assert np.isfinite(law.end)
 
 
 def sampled(solved: Solved, dt: float = 1e-3) -> Trajectory:

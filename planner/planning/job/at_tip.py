@@ -1,13 +1,21 @@
-"""Jobs of the tool's tip: planned through the kinematics, delivered and judged in the joints."""
+"""Jobs of the tool's tip: planned through the kinematics, delivered and judged in the joints.
+
+Between two setpoints the joints run straight, and the tip does not: its way bows from the chord between both tips
+by about dt^2/8 |D2p(q', q')|, p the tip as a function of the joints q. What that is at most, as fast as feed and
+joints allow, is left free of the tolerance (`room_for_joints`), as the verdict adds the largest bow to the
+contour error.
+"""
 
 import dataclasses
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.geometry.chords import points_on
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.machine.kinematics import Chain, kinematics_of
@@ -18,6 +26,11 @@ from planner.motion.trajectory import Trajectory
 from planner.nc.program import Program
 from planner.planning.job.plan import Plan
 from planner.verifier import WHOLE, Given, Verdict, verify, verify_joints
+
+# Intervals of a block in which the bow of the tip is looked at.
+LOOKED_AT = 4
+# Share of the tolerance that is left free for it at most [-]: with more the motion has to be slower, and the verdict says so.
+LEFT_FREE_MOST = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +53,46 @@ def chain_of(program: Program, machine: Machine) -> Chain | None:
     if program.tool_point is None or any(isinstance(limit, LinearJoint) for limit in machine.own):
         return None
     return kinematics_of(machine, program.tool_point.length)
+
+
+def room_for_joints(toolpath: Toolpath, machine: Machine) -> float:
+    """How far the tip leaves its chord between two setpoints of the joints on the path, at most (module text) [mm]; 0 where
+    the machine is not one for the tip (`at_tip`)."""
+    joints = {limit.letter: limit for limit in machine.own if isinstance(limit, LinearJoint)}
+    chain = next((one.kinematics for one in joints.values() if isinstance(one.kinematics, Chain)), None)
+    if chain is None:
+        return 0.0
+    axes, radius = toolpath.axes, machine.radius
+    fastest = machine.limits("velocity", axes).copy()
+    for k, letter in enumerate(axes):
+        fastest[k] = joints[letter].velocity if letter in joints else fastest[k]
+
+    def changed(places: FloatArray, function: Callable[[dict[str, Any]], dict[str, Any]]) -> FloatArray:
+        still = dict.fromkeys(chain.axes, np.zeros(len(places)))
+        found = function(in_rad(still | dict(zip(axes, places.T, strict=True)), radius))
+        return np.column_stack([found.get(letter, places[:, k]) for k, letter in enumerate(axes)])
+
+    share = np.linspace(0.0, 1.0, LOOKED_AT + 1)
+    tips = toolpath.start[:, None] + share[:, None] * (toolpath.end - toolpath.start)[:, None]
+    curved = np.flatnonzero((toolpath.arc >= 0) | (toolpath.curve >= 0))
+    segment = np.repeat(curved, len(share))
+    along = toolpath.length[segment] * np.tile(share, len(curved))
+    tips[curved] = points_on(toolpath, segment, along).reshape(-1, *tips.shape[1:])
+    q = changed(tips.reshape(-1, len(axes)), chain.joints).reshape(tips.shape)
+    way = np.diff(q, axis=1)
+    lasts = np.maximum(
+        toolpath.length[:, None] / LOOKED_AT / toolpath.feed[:, None], (np.abs(way) / fastest).max(axis=2)
+    )
+    speed = (way / lasts[:, :, None]).reshape(-1, len(axes))
+    # where two blocks meet the motion has some of the velocity of both
+    bent = np.concatenate([speed, (speed[1:] + speed[:-1]) / 2.0])
+    at = np.concatenate(
+        [(q[:, 1:] + q[:, :-1]).reshape(-1, len(axes)) / 2.0, q[:, 1:].reshape(-1, len(axes))[:-1]]
+    )
+    before, behind = (changed(at + side * machine.dt / 2.0 * bent, chain.point) for side in (-1.0, 1.0))
+    off = changed(at, chain.point) - (before + behind) / 2.0
+    linear = [axes.index(letter) for letter in joints if letter in axes]
+    return float(np.linalg.norm(off[:, linear], axis=1).max(initial=0.0))
 
 
 def joints_of(plan: Plan) -> Callable[[Trajectory], Trajectory] | None:

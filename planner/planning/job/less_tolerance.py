@@ -37,14 +37,14 @@ def with_less_tolerance(job: Job, made: Plan, planned: Callable[[Job], Plan]) ->
             break
         path = less
         stops = int((less.joint == Joint.STOP).sum() - (programmed.joint == Joint.STOP).sum())
-        corners = int((less.tolerance < programmed.tolerance).sum())
+        corners = int((less.tolerance < job.toolpath.tolerance).sum())
         job.tell("less for the period", round=again, corners=corners, stops=stops)
         made = planned(dataclasses.replace(job, toolpath=path, judged=(machine, programmed)))
     if path is job.toolpath:
         return made
     # what less tolerance costs is not in the problem's prices
     making = made.making and made.making._replace(priced=None)
-    notes = (*made.notes, _said(made, programmed, path))
+    notes = (*made.notes, _said(made, job.toolpath, path))
     return dataclasses.replace(made, prices=None, making=making, notes=notes)
 
 

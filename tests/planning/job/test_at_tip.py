@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import planner
-from planner.machine.kinematics import kinematics_of
+from planner.machine.kinematics import at_tip, kinematics_of
 from planner.motion.on_demand import TrajectoryOnDemand
 from planner.nc.reader import parse_program
-from planner.planning.job.at_tip import in_joints
+from planner.planning.job.at_tip import in_joints, room_for_joints
+from planner.verifier import verify
 from tests.machine.kinematics.five_axis import table_machine
 
 MACHINE = table_machine(y_offset=-20.0, z_offset=35.0, tool_length=60.0)
@@ -81,3 +82,45 @@ def test_methods_that_do_not_know_joints_keep_them_where_nothing_turns(method: s
     still = {name: check for name, check in found.verdict.limits.items() if name[-2:] in (".x", ".z")}
     assert max(check.ratio for check in still.values()) > 0.99  # of the slower z too
     assert all(not check.broken for check in still.values()), found.verdict.faults
+
+
+CORNERS = (
+    "G21 G90 G94 F6000\nG64 P0.02\nM428\nG0 X20 Y0 Z10 A0 C0\nG1 X30 Y5 A5 C10\nX40 Y-5 A15 C30\n"
+    "X35 Y-15 Z8 A20 C45\nX20 Y-10 Z5 A10 C20\nX0 Y0 Z10 A0 C0\nM429\nM2\n"
+)
+
+
+@pytest.fixture(scope="module")
+def together() -> planner.Plan:
+    return planner.plan(parse_program(CORNERS, MACHINE), MACHINE, effort="quick").require()
+
+
+@pytest.mark.shows("tool-point", "sampled: path and feed found together under the limits of the joints")
+@pytest.mark.slow
+def test_path_and_feed_are_found_together_at_the_tip(together: planner.Plan) -> None:
+    """Faster than along splines, and judged in the joints by other code."""
+    along = planner.plan(together.program, MACHINE, effort="quick", geometry="spline").require()
+    assert together.verdict is not None
+    assert together.verdict.passed
+    assert "together" in together.sentence
+    assert together.cycle_time < 0.98 * along.cycle_time
+    assert together.verdict.limits["acceleration.x"].ratio > 0.99  # of a joint
+
+
+@pytest.mark.slow
+def test_the_bow_of_the_tip_is_left_free(together: planner.Plan) -> None:
+    """What is reserved is what the verdict finds between setpoints, or a little more; and the rest is used."""
+    assert together.verdict is not None
+    assert together.joints is not None
+    assert together.trajectory is not None
+    at_the_tip = at_tip(MACHINE, kinematics_of(MACHINE, together.program.tool_point.length))
+    reserved = room_for_joints(together.toolpath, at_the_tip)
+    at_setpoints = verify(
+        together.trajectory, together.toolpath, at_the_tip.with_own(()), not_limited=("jerk",)
+    )
+    found = together.verdict.contour_error_mm - at_setpoints.contour_error_mm
+    assert 0.3 * reserved < found <= reserved
+    assert 0.98 * 0.02 < together.verdict.contour_error_mm <= 0.02
+    assert room_for_joints(together.toolpath, MACHINE) == 0.0  # where x, y and z are joints
+    twice = at_the_tip.model_copy(update={"dt": 2.0 * MACHINE.dt})
+    assert room_for_joints(together.toolpath, twice) == pytest.approx(4.0 * reserved, rel=1e-3)

@@ -24,7 +24,9 @@ from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints import speed_limits
 from planner.feedrate.constraints.problem import FeedrateProblem
 
-if TYPE_CHECKING:  # scipy.interpolate is half of what a process of the runner would import, and most have no use for it
+if (
+    TYPE_CHECKING
+):  # scipy.interpolate is half of what a process of the runner would import, and most have no use for it
     from scipy.interpolate import BSpline
 
 AXES = "xyzabcd"

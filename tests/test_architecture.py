@@ -68,13 +68,20 @@ MODULES = modules()
 
 
 @cache
+def import_statements(module: str) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    """Those of a module, also inside functions and for annotations."""
+    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    return tuple(node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom))
+
+
+@cache
 def imports(module: str) -> frozenset[str]:
     """Names of the package's modules that a module imports; a package's own modules may be named by it."""
     names = set()
-    for node in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))):
+    for node in import_statements(module):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
+        elif node.module:
             assert not node.level, f"{module}: relative import; write the full name"
             named = {f"{node.module}.{alias.name}" for alias in node.names}
             names |= {name if name in MODULES else node.module for name in named}
@@ -113,17 +120,17 @@ def test_the_verifier_is_independent() -> None:
 
 def test_nobody_who_plans_uses_the_verifier() -> None:
     """All imports count, those for annotations and inside functions too."""
-    for module, file in MODULES.items():
+    for module in MODULES:
         short = module.removeprefix("planner.")
         if short.split(".")[0] == "verifier":
             continue
         names = VERDICT_RECORDS | (
             JUDGING if any(f"{short}.".startswith(f"{may}.") for may in MAY_JUDGE) else set()
         )
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in import_statements(module):
             if isinstance(node, ast.Import):
                 assert not any(alias.name.startswith("planner.verifier") for alias in node.names), module
-            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("planner.verifier"):
+            elif (node.module or "").startswith("planner.verifier"):
                 assert node.module == "planner.verifier", (
                     f"{module} imports {node.module}: only what the room says"
                 )

@@ -49,8 +49,8 @@ def test_file_names_are_used_once() -> None:
 
 def private_names(tree: ast.Module) -> set[str]:
     """Names of the package with a leading underscore that are imported, or reached through an imported module."""
-    modules, found = set(), set()
-    for node in ast.walk(tree):
+    modules, found, nodes = set(), set(), list(ast.walk(tree))
+    for node in nodes:
         if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "planner":
             for alias in node.names:
                 modules.add(alias.asname or alias.name)
@@ -59,7 +59,7 @@ def private_names(tree: ast.Module) -> set[str]:
             modules |= {
                 alias.asname or alias.name for alias in node.names if alias.name.startswith("planner")
             }
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Attribute) and is_private(node.attr):
             owner = node.value
             if isinstance(owner, ast.Name) and owner.id in modules:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -37,10 +38,12 @@ def names(tree: ast.Module) -> Iterator[str]:
                 yield from [other] if other else []
 
 
-def words(name: str) -> set[str]:
+@cache
+def words(name: str) -> frozenset[str]:
     """The words of a name, in the singular: `first_cell`, `StraightCells`."""
     found = {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
-    return found | {word.removesuffix("s") for word in found} | {word.removesuffix("es") for word in found}
+    singular = {word.removesuffix("s") for word in found} | {word.removesuffix("es") for word in found}
+    return frozenset(found | singular)
 
 
 def wrong_words(name: str, module: str) -> set[str]:
@@ -48,7 +51,7 @@ def wrong_words(name: str, module: str) -> set[str]:
     if name == "slice":
         return set()
     allowed = {"cell"} if module.startswith(CELLS_IN) else set()
-    return (words(name) & INSTEAD.keys()) - allowed
+    return set(words(name) & INSTEAD.keys()) - allowed
 
 
 def test_words_of_names_are_told_apart() -> None:

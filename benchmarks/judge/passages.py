@@ -36,7 +36,7 @@ def passed(motion: Motion, vertices: Array, within: Array) -> tuple[Array, Array
     p = motion.position
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1)))
     # distances of chords say nothing of the order within one: of long ones too little is asked, of places between setpoints too much
-    squares = _chord_distances(p, vertices), ((p - vertices[:, None]) ** 2).sum(axis=2)
+    squares = _chord_distances(p, vertices), np.array([_dot(off, off) for off in p - vertices[:, None]])
     near = np.concatenate([_in_order(square, within) for square in squares])
     chords = np.unique(np.clip(near[:, None] + np.arange(-AROUND, AROUND + 1), 0, len(p) - 2))
     w = np.linspace(0.0, 1.0, FINE + 1)[1:]
@@ -69,12 +69,17 @@ def _in_order(square: Array, within: Array) -> Array:
 def _chord_distances(p: Array, vertices: Array) -> Array:
     """(V, n-1) squared distances of vertices (V, A) from the chords of points (n, A)."""
     way = np.diff(p, axis=0)
-    square, rows = np.maximum((way**2).sum(axis=1), 1e-300), []
+    square, rows = np.maximum(_dot(way, way), 1e-300), []
     for vertex in vertices:
         off = vertex - p[:-1]
-        share = np.clip((off * way).sum(axis=1) / square, 0.0, 1.0)
-        rows.append(((off - share[:, None] * way) ** 2).sum(axis=1))
+        off -= np.clip(_dot(off, way) / square, 0.0, 1.0)[:, None] * way
+        rows.append(_dot(off, off))
     return np.array(rows)
+
+
+def _dot(one: Array, other: Array) -> Array:
+    """(n,) of rows (n, A): a sum over an axis of three numbers takes several times as long."""
+    return np.einsum("na,na->n", one, other)
 
 
 def _on_lines(motion: Motion, chords: Array, w: Array) -> Array:

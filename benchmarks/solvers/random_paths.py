@@ -16,13 +16,18 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 
 from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints import speed_limits
 from planner.feedrate.constraints.problem import FeedrateProblem
+
+if (
+    TYPE_CHECKING
+):  # scipy.interpolate is half of what a process of the runner would import, and most have no use for it
+    from scipy.interpolate import BSpline
 
 AXES = "xyzabcd"
 QUINTIC = 5
@@ -51,6 +56,8 @@ class Limits:
 def random_path(seed: int, points: int | None = None) -> FeedrateProblem:
     """Seeded: a quintic spline through 6 to 20 random points some 1 to 30 mm apart; axis velocities of 30 to 300 mm/s and
     accelerations of 1 to 10 m/s2; the jerk takes 0.03 to 3 times as long to reach the acceleration as that the velocity."""
+    from scipy.interpolate import make_interp_spline
+
     rng = np.random.default_rng([31, seed])
     axes, waypoints = int(rng.integers(2, 7)), int(rng.integers(6, 21))
     steps = rng.normal(size=(waypoints, axes)) * 10.0 ** rng.uniform(0.0, 1.5) / np.sqrt(axes)
@@ -70,6 +77,8 @@ def copp_spline(seed: int) -> FeedrateProblem:
     """Seeded: a spline through 50 waypoints uniform in [-0.5, 0.5], 7 axes, 1001 stations uniform in the spline's parameter, which
     stands for the arc length (rad throughout). The spline is copp's default: quintic, its first and second derivatives 0 at both
     ends. Copp draws upper and lower limits separately; here they are equal."""
+    from scipy.interpolate import make_interp_spline
+
     rng = np.random.default_rng([32, seed])
     waypoints = rng.uniform(-0.5, 0.5, (COPP_WAYPOINTS, COPP_AXES))
     drawn = {name: limit * rng.uniform(0.9, 1.1, COPP_AXES) for name, limit in COPP_LIMITS.items()}
@@ -83,6 +92,8 @@ def copp_spline(seed: int) -> FeedrateProblem:
 
 def nurbs(name: str, points: int, jerk: float = CURVE_LIMITS["jerk"]) -> FeedrateProblem:
     """A curve of curves.json at the limits of the shared machine; every knot is a grid point, because r''' jumps there."""
+    from scipy.interpolate import BSpline
+
     curve = CURVES[name]
     knots, degree = np.array(curve["knots"], dtype=float), curve["degree"]
     weights = np.array(curve["weights"], dtype=float)[:, None]
@@ -123,6 +134,8 @@ class _Pieces:
 
 def long_path(points: int) -> FeedrateProblem:
     """A quintic spline in 3 axes with a waypoint every 50 points, some 10 mm apart, at the limits of the shared machine."""
+    from scipy.interpolate import make_interp_spline
+
     rng = np.random.default_rng([34, points])
     steps = rng.normal(size=(max(points // LONG_SPACING, QUINTIC + 1), 3)) * LONG_STEP / np.sqrt(3.0)
     chords = np.cumsum(np.linalg.norm(steps, axis=1))

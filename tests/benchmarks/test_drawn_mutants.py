@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -21,10 +22,12 @@ def test_every_area_has_mutants_that_are_python(area: str) -> None:
     few, more = drawn(area, 3), drawn(area, 25)
     assert more[:3] == few
     assert len({mutant.key for mutant in more}) == len(more) == 25
+    texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in {mutant.file for mutant in more}}
+    trees = {file: ast.dump(ast.parse(text)) for file, text in texts.items()}
     for mutant in more:
-        text = (ROOT / mutant.file).read_text(encoding="utf-8")
+        text = texts[mutant.file]
         changed = mutant.of(text)
-        assert ast.dump(ast.parse(changed)) != ast.dump(ast.parse(text)), mutant.key
+        assert ast.dump(ast.parse(changed)) != trees[mutant.file], mutant.key
         assert sum(a != b for a, b in zip(text.splitlines(), changed.splitlines(), strict=True)) == 1
 
 
@@ -79,42 +82,52 @@ def test_tests_of_a_line(tmp_path: Path) -> None:
 
 
 TRIED = """
+import json
 import sys
 from pathlib import Path
 from benchmarks.mutants import trial
 from benchmarks.mutants.draw import Mutant
 trial.CPU = 2
-mutant = Mutant(area="judge", file="summed.py", line=7, column=12, old=" + ", new=sys.argv[2])
-found = trial.outcome(mutant, Path(sys.argv[1]), ["tests/test_summed.py"], {"test_summed.py::test_broken"})
-print(*map(repr, (found[0].replace(" ", "_"), found[1])))
+found = []
+for new in sys.argv[2:]:
+    mutant = Mutant(area="judge", file="summed.py", line=7, column=12, old=" + ", new=new)
+    became, by, *_ = trial.outcome(mutant, Path(sys.argv[1]), ["tests/test_summed.py"], {"test_summed.py::test_broken"})
+    found.append((became, repr(by), (Path(sys.argv[1]) / "summed.py").read_text()))
+print(json.dumps(found))
 """
+SUMMED = "def forever():\n    while True:\n        pass\n\n\ndef total(a, b):\n    return a + b\n"
+BECAME = {" - ": KILLED, " + 0 * ": KILLED, " + 0 + ": SURVIVED, " + forever() + ": NO_END}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("new", "expected"),
-    [(" - ", KILLED), (" + 0 * ", KILLED), (" + 0 + ", SURVIVED), (" + forever() + ", NO_END)],
-)
-def test_what_becomes_of_a_mutant(tmp_path: Path, new: str, expected: str) -> None:
-    """In a process of its own, which leaves this one and the copy as they were. Tests that fail without it can be left out."""
-    source = "def forever():\n    while True:\n        pass\n\n\ndef total(a, b):\n    return a + b\n"
-    (tmp_path / "summed.py").write_text(source)
-    (tmp_path / "tests").mkdir()
-    (tmp_path / "tests" / "test_summed.py").write_text(
+@pytest.fixture(scope="module")
+def tried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, str, str]]:
+    """What became of each mutant, by which test, and the source afterwards; all in one process, which takes seconds to start."""
+    folder = tmp_path_factory.mktemp("copy")
+    (folder / "summed.py").write_text(SUMMED)
+    (folder / "tests").mkdir()
+    (folder / "tests" / "test_summed.py").write_text(
         "from summed import total\n\ndef test_total():\n    assert total(2, 3) == 5\n\ndef test_broken():\n    assert False\n"
     )
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow\n")
+    (folder / "pytest.ini").write_text("[pytest]\nmarkers = slow\n")
     done = subprocess.run(  # it forks, which is not for a process that has threads
-        [sys.executable, "-c", TRIED, str(tmp_path), new],
+        [sys.executable, "-c", TRIED, str(folder), *BECAME],
         capture_output=True,
         text=True,
         check=False,
         cwd=ROOT,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split()[0] == repr(expected.replace(" ", "_"))
-    assert ("test_summed.py::test_total" in done.stdout) == (expected == KILLED)
-    assert (tmp_path / "summed.py").read_text() == source
+    return dict(zip(BECAME, map(tuple, json.loads(done.stdout.splitlines()[-1])), strict=True))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("new", "expected"), BECAME.items())
+def test_what_becomes_of_a_mutant(tried: dict[str, tuple[str, str, str]], new: str, expected: str) -> None:
+    """In a process of its own, which leaves this one and the copy as they were. Tests that fail without it can be left out."""
+    became, by, source = tried[new]
+    assert became == expected
+    assert ("test_summed.py::test_total" in by) == (expected == KILLED)
+    assert source == SUMMED
 
 
 def test_shares_leave_out_mutants_that_change_nothing() -> None:

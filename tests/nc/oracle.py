@@ -8,6 +8,7 @@ test_random_agreement.py checks that it is current where LinuxCNC is there. Numb
 from __future__ import annotations
 
 import gzip
+import itertools
 import json
 import os
 import shutil
@@ -68,11 +69,21 @@ def ask_oracle(jobs: list[dict], folder: Path) -> list[Canon]:
 
 def asked(texts: list[str], setup: dict[str, Any], folder: Path) -> list[Canon]:
     """What LinuxCNC makes of texts, with its offsets and tools in `setup`."""
-    jobs = []
-    for k, text in enumerate(texts):
-        (folder / f"{k}.ngc").write_text(text)
-        jobs.append({"path": str(folder / f"{k}.ngc"), **setup})
-    return ask_oracle(jobs, folder)
+    return asked_of_kinds({"": (texts, setup)}, folder)[""]
+
+
+def asked_of_kinds(
+    programs: dict[str, tuple[list[str], dict[str, Any]]], folder: Path
+) -> dict[str, list[Canon]]:
+    """The same of texts and setup by kind, in one run of the oracle: to start it takes as long as to read a hundred programs."""
+    jobs: list[dict] = []
+    for texts, setup in programs.values():
+        for text in texts:
+            path = folder / f"{len(jobs)}.ngc"
+            path.write_text(text)
+            jobs.append({"path": str(path), **setup})
+    answers = iter(ask_oracle(jobs, folder))
+    return {kind: list(itertools.islice(answers, len(texts))) for kind, (texts, _) in programs.items()}
 
 
 # --- recorded answers ---------------------------------------------------------------------------------------------------------
@@ -80,14 +91,15 @@ def asked(texts: list[str], setup: dict[str, Any], folder: Path) -> list[Canon]:
 
 def record(programs: dict[str, tuple[list[str], dict[str, Any]]]) -> bytes:
     """The file of answers: texts and setup of each kind, as LinuxCNC reads them now."""
-    kinds = {}
-    for kind, (texts, setup) in programs.items():
-        with tempfile.TemporaryDirectory() as folder:
-            answers = asked(texts, setup, Path(folder))
-        kinds[kind] = [
+    with tempfile.TemporaryDirectory() as folder:
+        answers = asked_of_kinds(programs, Path(folder))
+    kinds = {
+        kind: [
             {"text": text, "error": found.error, "move": _short(found.move), "further": _short(found.further)}
-            for text, found in zip(texts, answers, strict=True)
+            for text, found in zip(texts, answers[kind], strict=True)
         ]
+        for kind, (texts, _) in programs.items()
+    }
     return gzip.compress(json.dumps(kinds, separators=(",", ":")).encode(), mtime=0)
 
 

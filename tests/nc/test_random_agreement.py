@@ -7,12 +7,13 @@ it goes straight on (planner/nc/cutter.py).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
-from oracle import Canon, asked, needs_oracle, recorded
+from oracle import Canon, asked, asked_of_kinds, needs_oracle, recorded
 from random_nc import KINDS as OF_ONE_KIND
 from random_splines import random_splines
 from random_together import together
@@ -69,14 +70,32 @@ class Tally:
         self.blocks += len(program)
 
 
-def compare(kind: str, count: int, seed: int, folder: Path) -> Tally:
-    """Read `count` random programs of a kind on both sides."""
+def random_texts(kind: str, count: int, seed: int) -> list[str]:
+    """So many programs of a kind."""
     rng = np.random.default_rng(seed)
-    texts = [KINDS[kind](rng) for _ in range(count)]
+    return [KINDS[kind](rng) for _ in range(count)]
+
+
+def tally_of(kind: str, programs: Iterable[tuple[str, Canon]]) -> Tally:
+    """What becomes of programs of a kind, with LinuxCNC's answers."""
     tally = Tally()
-    for text, canon in zip(texts, asked(texts, offsets_in_inches(), folder), strict=True):
+    for text, canon in programs:
         tally.add(kind, text, canon)
     return tally
+
+
+def compare(kind: str, count: int, seed: int, folder: Path) -> Tally:
+    """Read `count` random programs of a kind on both sides."""
+    texts = random_texts(kind, count, seed)
+    return tally_of(kind, zip(texts, asked(texts, offsets_in_inches(), folder), strict=True))
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[str, Canon]]]:
+    """`COUNT` random programs of every kind, and what LinuxCNC makes of them."""
+    programs = {kind: (random_texts(kind, COUNT, 2026), offsets_in_inches()) for kind in KINDS}
+    answers = asked_of_kinds(programs, tmp_path_factory.mktemp("random"))
+    return {kind: list(zip(texts, answers[kind], strict=True)) for kind, (texts, _) in programs.items()}
 
 
 def assert_agreed(tally: Tally, count: int) -> None:
@@ -89,17 +108,14 @@ def assert_agreed(tally: Tally, count: int) -> None:
 @pytest.mark.shows("read-linuxcnc", "compared: LinuxCNC 2.9's rs274, recorded answers to random programs")
 @pytest.mark.parametrize("kind", KINDS)
 def test_programs_agree_with_the_recorded_answers(kind: str) -> None:
-    tally = Tally()
-    for text, canon in recorded()[kind]:
-        tally.add(kind, text, canon)
-    assert_agreed(tally, len(recorded()[kind]))
+    assert_agreed(tally_of(kind, recorded()[kind]), len(recorded()[kind]))
 
 
 @pytest.mark.slow
 @needs_oracle
 @pytest.mark.parametrize("kind", KINDS)
-def test_random_programs_of_a_kind_agree(kind: str, tmp_path: Path) -> None:
-    assert_agreed(compare(kind, COUNT, 2026, tmp_path), COUNT)
+def test_random_programs_of_a_kind_agree(answered: dict[str, list[tuple[str, Canon]]], kind: str) -> None:
+    assert_agreed(tally_of(kind, answered[kind]), COUNT)
 
 
 @needs_oracle
@@ -107,9 +123,11 @@ def test_the_recorded_answers_are_current(tmp_path: Path) -> None:
     """They are LinuxCNC's to these programs (python -m benchmarks.controls.linuxcnc_answers makes them)."""
     programs = linuxcnc_answers.programs()
     assert list(programs) == list(recorded())
-    for kind, (texts, setup) in programs.items():
+    for kind, (texts, _) in programs.items():
         assert texts == [text for text, _ in recorded()[kind]], f"the generator of kind {kind} has changed"
-        for (text, kept), canon in zip(recorded()[kind], asked(texts, setup, tmp_path), strict=True):
+    answers = asked_of_kinds(programs, tmp_path)
+    for kind in programs:
+        for (text, kept), canon in zip(recorded()[kind], answers[kind], strict=True):
             assert kept.error == canon.error, text
             np.testing.assert_allclose(kept.move, canon.move, rtol=1e-11, atol=1e-11, err_msg=text)
             np.testing.assert_allclose(kept.further, canon.further, rtol=1e-11, atol=1e-11, err_msg=text)

@@ -187,7 +187,7 @@ def test_a_spiral_with_turns_closer_than_the_budget_passes():
     assert verdict.passed, verdict.faults
 
 
-coordinate = st.floats(-50, 50).map(lambda x: round(x, 3))
+coordinate = st.floats(-15, 15).map(lambda x: round(x, 3))
 point = st.tuples(coordinate, coordinate, coordinate)
 
 

@@ -136,9 +136,8 @@ def test_a_sweep_is_taken_up_again(job: Path, tmp_path: Path) -> None:
     assert {f for f in files if f.stat().st_mtime_ns == written[f]} == set(files[2:])
     time = {k: v for k, v in table.items() if k != "planning_cpu_s"}
     assert {k: v for k, v in pq.read_table(out / "sweep.parquet").to_pydict().items() if k in time} == time
-    more = run(
-        job, "-o", out, "--vary", "tolerance=0.01,0.02,0.03", "--vary", "x.jerk=1e5", "--method", "stop"
-    )
+    fewer = ("--vary", "tolerance=0.01,0.02,0.03", "--vary", "x.jerk=1e5")
+    more = run(job, "-o", out, *fewer, "--method", "stop", "--threads", 1)
     assert "3, 2 of them planned before: 3 passed" in more.stdout
 
 
@@ -273,7 +272,7 @@ def test_a_cluster_goes_on_without_a_worker_that_is_killed_and_ends_with_its_sch
 ) -> None:
     """Without its scheduler a sweep ends with a sentence; what was planned stays, and the same command goes on with it."""
     address, workers, scheduler = cluster
-    out, count = tmp_path / "out", 40
+    out, count = tmp_path / "out", 16
     there, code, said, err = killed_on_the_way(sweep_on(address, job, out, count), out, workers[0])
     assert there < count  # it was on its way
     assert code == 0, err
@@ -286,7 +285,7 @@ def test_a_cluster_goes_on_without_a_worker_that_is_killed_and_ends_with_its_sch
     assert own["cycle_time_s"] == pytest.approx(table["cycle_time_s"][-1], rel=1e-12)
     assert workers[1].poll() is None
 
-    out, count = tmp_path / "second", 60
+    out, count = tmp_path / "second", 24
     command = sweep_on(address, job, out, count)
     _, code, _, err = killed_on_the_way(command, out, scheduler)
     there = len(list((out / "points").glob("*.json")))

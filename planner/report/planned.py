@@ -143,7 +143,7 @@ def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:
 def _expanded(data: bytes, plan: Plan, whole: Program, feeds: FloatArray, often: FloatArray | None) -> bytes:
     """The expanded program with its feeds, which reads back as the same path. Raises LeftOut if it does
     not."""
-    from planner.nc.language.flat import flat_program  # 10 ms, for programs that compute
+    from planner.nc.writer import flat_program  # 10 ms, for programs that compute
 
     source = plan.program.source
     found = flat_program(data, plan.machine, plan.program.reading, source=source)

@@ -47,7 +47,7 @@ def source_of(plan: Plan) -> Source:
         return _read(program_text(program, feeds, 1.0).encode(), plan, "as an NC program")
     if program.expansion is None:
         return rows_of(text, _same(text, plan, program.reading, ""), plan.machine)
-    from planner.nc.language.flat import flat_program  # 10 ms, for programs that compute
+    from planner.nc.writer import flat_program  # 10 ms, for programs that compute
 
     found = flat_program(text, plan.machine, program.reading, source=program.source)
     if found is None:

@@ -20,7 +20,7 @@ from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, at_place, in_plane
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter, CutterFault, OffsetMove, dot, meeting
-from planner.nc.language.travel_rows import AXES, STANDS, STOPS, G, M, Move, TravelRow, arc_words
+from planner.nc.language.rows import AXES, STANDS, STOPS, G, M, Move, TravelRow, arc_words
 from planner.nc.program import Kind
 from planner.nc.state import State
 

@@ -10,7 +10,7 @@ their order, which is not documented, is refused. A shift alone becomes a G52; e
 the coordinates of the work system (`travel`).
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from functools import partial
 
 import numpy as np
@@ -19,10 +19,9 @@ from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.approach import ContourWay
-from planner.nc.language.making import TAPPED, Maker, Making, Row, around
-from planner.nc.language.travel import FRAME_CHANGES
-from planner.nc.language.travel_rows import STANDS, TravelRow, turned
+from planner.nc.language.making import TAPPED, Given, Maker, Making, Row, around
+from planner.nc.language.rows import STANDS, TravelRow, turned
+from planner.nc.language.travel import FRAME_CHANGES, ContourWay
 from planner.nc.language.tree import Expression, MadeRows, SourcePlace, made
 from planner.nc.program import Kind
 
@@ -31,7 +30,6 @@ FRAMES = ("TRANS", "ROT", "SCALE", "MIRROR")  # of Siemens, with A before them w
 _G63 = 63.0
 _FLAT = 1e-9  # relative, below which three points are on a line
 _F = ord("F")
-Given = Mapping[str, float]
 
 
 def siemens_frame(making: Making, given: Given, *, name: str) -> Iterator[Row]:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
+from planner.nc.language.rows import TravelRow
 from planner.nc.language.travel import Travel
-from planner.nc.language.travel_rows import TravelRow
 from planner.nc.language.tree import MadeRows, SourcePlace, made
 
 ASSUMED = {
@@ -33,8 +33,9 @@ ASSUMED = {
 }
 TAPPED = "tapping is planned with lead times speed as its upper limit and full stops, not at constant feed"
 Row = list[tuple[str, float]]
-Cycle = Callable[["Making", Mapping[str, float]], Iterable[Row]]
-Maker = Callable[["Making", Mapping[str, float]], Iterable[Row] | None]
+Given = Mapping[str, float]  # values of a command by name
+Cycle = Callable[["Making", Given], Iterable[Row]]
+Maker = Callable[["Making", Given], Iterable[Row] | None]
 ROWS_MAX = 200_000  # of one cycle: an infeed that small is a mistake
 _ROUNDING = 1e-9  # of a number of steps
 _COARSE = {

@@ -12,7 +12,7 @@ from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.arcs import IN_PLANE, Arc, ArcWay, arc_from_centre, arc_from_radius, at_place, in_plane
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.travel_rows import (
+from planner.nc.language.rows import (
     AXES,
     CENTRES,
     RADIUS,

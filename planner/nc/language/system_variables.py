@@ -13,8 +13,8 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language import tree
+from planner.nc.language.rows import FrameParts
 from planner.nc.language.travel import Travel
-from planner.nc.language.travel_rows import FrameParts
 from planner.nc.program import PathControl
 from planner.nc.state import FURTHER_SYSTEMS, SYSTEMS, State, System, system_name
 
@@ -176,11 +176,8 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
     state = system.interpreter.state
     tool, none = state.tools.get(state.tool_loaded), state.zeros()
     homes = {5161: state.homes.get(280, none), 5181: state.homes.get(300, none)}
-    for first, place in {
-        **homes,
-        5211: state.g92,
-        5401: state.tool_offset,
-    }.items():  # others than x y z are 0
+    places = homes | {5211: state.g92, 5401: state.tool_offset}
+    for first, place in places.items():  # others than x y z are 0
         if first <= number < first + 3:
             return float(place[number - first])
     if 5221 <= number < 5221 + _OF_ONE * len(SYSTEMS):

@@ -6,14 +6,14 @@ to can be read by others.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
 from planner.base.arrays import FloatArray
 from planner.nc import lathe_cuts, turning
 from planner.nc.faults import Notes
-from planner.nc.language.making import Maker, Making, Row
+from planner.nc.language.making import Given, Maker, Making, Row
 from planner.nc.program import Kind, Program
 from planner.nc.turning import Leg
 
@@ -21,7 +21,6 @@ RETRACT = 0.5  # e where the program does not give it; controls have a setting [
 _NEEDS = "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
 _WRONG = {(Kind.DWELL, Kind.STOP): "a dwell or a stop", (Kind.SPLINE,): "a spline"}
 _START = "_cycle x", "_cycle z"  # shared names of where the tool stood [mm]
-Given = Mapping[str, float]
 
 
 def start(making: Making, given: Given) -> None:

@@ -24,7 +24,7 @@ at Q204 above the surface. In all cycles Q200 clearance, Q201 depth, Q203 surfac
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -33,6 +33,7 @@ from typing import Any
 from planner.nc.language.making import (
     BREAK,
     Cycle,
+    Given,
     HolePlan,
     Making,
     Pecks,
@@ -58,7 +59,6 @@ _CORNERS = {0: 0j, 1: -1 - 1j, 2: 1 - 1j, 3: 1 + 1j, 4: -1 + 1j}
 _PLUNGED = (
     "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
 )
-Given = Mapping[str, float]
 
 
 def _hole(given: Given, what: str = "hole") -> HolePlan:

@@ -14,24 +14,24 @@ from collections.abc import Callable
 from functools import partial
 
 from planner.base.units import MM_PER_INCH
+from planner.nc.arcs import PLANES
 from planner.nc.language import makers, tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.making import assumed_row
 from planner.nc.language.siemens import cycles, tables
-from planner.nc.language.siemens.places import AXES, Places, Row
+from planner.nc.language.siemens.commands import AXES, Commands, Row
 from planner.nc.language.siemens.text import LineTokens
 
 # G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
 _ARCS = {"CIP": makers.arc_through, "CT": makers.tangent_arc}
 EACH_LINE = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
-_PLANES = {17: 2, 18: 1, 19: 0}
 _TAPS = (331, 332, 63)
 _WORDS = "XYZIJKFSTMDHABCUVW"
 _MAIN = "1"  # S1= and M1= are those of the first spindle, which is planned; others are left out
 
 
-class BlockWords(Places):
+class BlockWords(Commands):
     """Rows of words.
 
     circular : CIP or CT was written, and no other motion code since
@@ -197,7 +197,7 @@ class BlockWords(Places):
             self.absolute = code == 90
             if reader.peek() == "(":
                 raise reader.fault(f"G{code}(...) is not read")
-        self.normal = _PLANES.get(code, self.normal)
+        self.normal = PLANES.get(code, self.normal)
         if code in (70, 71, 700, 710):
             self.unit = MM_PER_INCH if code in (70, 700) else 1.0
         if f"G{code}" in tables.REFUSED and not (code == 451 and not self.compensates):

@@ -227,7 +227,7 @@ class FanucVariables(SystemVariables):
     def get(self, parameter: int | str, depth: int) -> float:
         """A parameter by its number, `depth` calls open. Raises ValueError for what is not known."""
         assert isinstance(parameter, int)
-        state, cutter, number = self.interpreter.state, self.interpreter.mover.cutter, parameter
+        state, cutter, number = self.interpreter.state, self.interpreter.cutter, parameter
         parts = FrameParts() if self.travel is None else self.travel.parts
         if 4201 <= number <= 4330:
             number -= 200

@@ -98,7 +98,7 @@ def _set(making: Making, code: str, given: Given) -> None:
 def _frame(making: Making, given: Given, *, code: str) -> None:
     """G68 and the others. Raises ValueError."""
     travel = making.travel
-    if making.interpreter.mover.cutter is not None:
+    if making.interpreter.cutter is not None:
         raise ValueError(f"{code} while cutter radius compensation is on; write G40 before it")
     if code == "G69" and not swivel.is_level(travel):
         swivel.tilt(making, np.eye(3), np.zeros(3), swivel.NO_MOVE, 0)

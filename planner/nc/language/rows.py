@@ -30,6 +30,12 @@ STANDS = 1e-9  # a move that is shorter stays where it is [mm]
 STOPS = (0.0, 1.0, 2.0, 30.0, 60.0)  # M codes that act after the moves of their row
 
 
+def require(good: object, message: str) -> None:
+    """Raise ValueError with a message unless all is good."""
+    if not good:
+        raise ValueError(message)
+
+
 @dataclass
 class TravelRow:
     """A row of words: (letter code, value, byte offset) each; its line and its call."""

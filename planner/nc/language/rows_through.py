@@ -25,6 +25,7 @@ from planner.nc.language.rows import (
     M,
     Move,
     TravelRow,
+    require,
     rows_from,
     travel_rows_of,
 )
@@ -137,8 +138,7 @@ class RowsThrough(Places):
             self._level = None
         for code in others & PLANES.keys():
             if PLANES[code] != self.normal:
-                if self.compensated:
-                    raise ValueError("the plane changes while cutter radius compensation is on")
+                require(not self.compensated, "the plane changes while cutter radius compensation is on")
                 self._no_corner(out)
             self.normal = PLANES[code]
         if others & {20.0, 21.0} and (20.0 in others) != (self._unit != 1.0):
@@ -199,9 +199,8 @@ class RowsThrough(Places):
         out.append(row)
 
     def _move(self, row: TravelRow, out: list[TravelRow]) -> None:
-        if self.motion < 0:
-            text = "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it"
-            raise ValueError(text)
+        text = "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it"
+        require(self.motion >= 0, text)
         given = self._lengths(row.words)
         target = self._target(given)
         mapped, arc = self.mapped(target), None
@@ -249,9 +248,8 @@ class RowsThrough(Places):
         waits = self._corner or self._coming
         if waits is None:
             return
-        if not waits.modal:
-            what = f"the rounding or chamfer of line {waits.line}"
-            raise ValueError(f"{what} needs a move in the plane before and behind")
+        what = f"the rounding or chamfer of line {waits.line}"
+        require(waits.modal, f"{what} needs a move in the plane before and behind")
         first, self._corner, self._coming = waits.first, None, None
         waiting, self._between = self._between, []
         rows: list[TravelRow] = []
@@ -269,8 +267,7 @@ class RowsThrough(Places):
         self.last = None
         self.motion = max(state.motion, -1 if state.fanuc else 0) if state.motion <= 3 else 0
         self._level = None if state.series is None else state.series.level * state.unit
-        if state.absolute_centre:
-            raise ValueError("frames and compensation with absolute arc centres are not read")
+        require(not state.absolute_centre, "frames and compensation with absolute arc centres are not read")
         self._look()
         if not state.absolute:
             self._ahead.append(TravelRow([(G, 90.0, 0)], 1, 0))

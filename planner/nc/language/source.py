@@ -39,6 +39,11 @@ class SourceLine:
         """A fault of the line, or of what begins at a byte of it."""
         return ProgramFault(self.place if at is None else self.place._replace(at=at), message)
 
+    def require(self, good: object, message: str, at: int | None = None) -> None:
+        """Raise such a fault unless all is good."""
+        if not good:
+            raise self.fault(message, at)
+
 
 class Source:
     """One file: its words, and the lines among them that may belong to the language."""

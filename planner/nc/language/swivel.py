@@ -18,7 +18,7 @@ from planner.base.arrays import FloatArray
 from planner.base.units import RAD_PER_DEG
 from planner.nc.language.makers import set_frame
 from planner.nc.language.making import Given, Making
-from planner.nc.language.rows import turned
+from planner.nc.language.rows import require, turned
 from planner.nc.language.travel import Travel
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
 
@@ -36,9 +36,8 @@ def siemens(making: Making, given: Given) -> None:
     mode = round(given.get("p3", 0.0))
     angles = [given.get(f"p{k}", 0.0) for k in (7, 8, 9)]
     before, behind = (np.array([given.get(f"p{k}", 0.0) for k in part]) for part in ((4, 5, 6), (10, 11, 12)))
-    if any(angles) and mode >> 6:
-        what = f"MODE {mode} of CYCLE800, angles of the rotary axes, solid or projection angles, is not read"
-        raise ValueError(f"{what}; write angles axis by axis (MODE 57 or 27)")
+    what = f"MODE {mode} of CYCLE800, angles of the rotary axes, solid or projection angles, is not read"
+    require(not any(angles) or not mode >> 6, f"{what}; write angles axis by axis (MODE 57 or 27)")
     if round(given.get("p2", 0.0)) % 10 == 1:
         raise ValueError("ST 1 of CYCLE800, a plane on another one, is not read; write its angles from zero")
     if given.get("p0", 0.0) and len(given) > 1:

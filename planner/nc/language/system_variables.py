@@ -13,7 +13,7 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language import tree
-from planner.nc.language.rows import FrameParts
+from planner.nc.language.rows import FrameParts, require
 from planner.nc.language.travel import Travel
 from planner.nc.program import PathControl
 from planner.nc.state import FURTHER_SYSTEMS, SYSTEMS, State, System, system_name
@@ -101,8 +101,7 @@ class SystemVariables:
     def system(self) -> int:
         """The work coordinate system in force, G54 is 0."""
         system = self.interpreter.state.system
-        if system not in SYSTEMS:
-            raise ValueError(f"{system_name(system)} has no number that a program can ask for here")
+        require(system in SYSTEMS, f"{system_name(system)} has no number that a program can ask for here")
         return SYSTEMS.index(system)
 
     def modes(self) -> Modes:
@@ -271,8 +270,7 @@ class FanucVariables(SystemVariables):
 
     def put(self, number: int, value: float | None) -> None:
         """Assign to a work offset. Raises ValueError for an alarm, and a state that codes change."""
-        if number == 3000:
-            raise ValueError(f"the program raises its alarm {value or 0:g} here")
+        require(number != 3000, f"the program raises its alarm {value or 0:g} here")
         if 3001 <= number <= 3007:
             return  # timers and what the operator may do: nothing moves
         system, axis = _work_offset(number) or (0, 3)

@@ -24,7 +24,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.nc.arcs import IN_PLANE, Arc, at_place, in_plane
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
-from planner.nc.language.rows import STANDS, Move, TravelRow
+from planner.nc.language.rows import STANDS, Move, TravelRow, require
 from planner.nc.language.rows_through import RowsThrough
 from planner.nc.state import tool_name
 
@@ -81,9 +81,8 @@ class ContourWay:
             sweep = way * math.radians(self.angle)
         else:
             away, size = other - centre, abs(self.radius)
-            if abs(away) < size:
-                where = f"the other end of the straight move lies inside the arc of radius {size:.6g} mm"
-                raise ValueError(f"{where}: there is no tangent to it")
+            where = f"the other end of the straight move lies inside the arc of radius {size:.6g} mm"
+            require(abs(away) >= size, f"{where}: there is no tangent to it")
             touching = math.acos(size / abs(away))
             far = centre + away / abs(away) * size * cmath.rect(1.0, turning * touching)
             if abs(far - contour) < STANDS:
@@ -156,15 +155,13 @@ class Travel(RowsThrough):
         """Radius of the loaded tool [mm], 0 where none is given. Raises ValueError below 0."""
         tool = self.interpreter.state.tools.get(self.interpreter.state.tool_loaded)
         found = (0.0 if tool is None else tool.diameter / 2.0) + self.oversize
-        if found < 0.0:
-            raise ValueError(f"the tool's radius and DR are together {found:g} mm")
+        require(found >= 0.0, f"the tool's radius and DR are together {found:g} mm")
         return found
 
     def set_frame(self, matrix: FloatArray, shift: FloatArray) -> None:
         """Points are at matrix (3, 3) times them and shift (3,) [mm] from now on. Raises ValueError."""
         self._no_corner()
-        if self.compensated:
-            raise ValueError(FRAME_CHANGES.removesuffix(" (R0, G40)"))
+        require(not self.compensated, FRAME_CHANGES.removesuffix(" (R0, G40)"))
         self._begin()
         out = self._out_of_plane(matrix)
         whole, there = self.swivelled[0] @ matrix, self.swivelled[0] @ shift + self.swivelled[1]
@@ -221,8 +218,7 @@ class Travel(RowsThrough):
         then, to the left (1) or right (-1). With 0 the path is that of a tool of radius 0 on its right. Raises
         ValueError."""
         self._no_corner()
-        if self.compensated:
-            raise ValueError("APPR while cutter radius compensation is on; write R0 or DEP before")
+        require(not self.compensated, "APPR while cutter radius compensation is on; write R0 or DEP before")
         self._begin()
         radius = self._known_radius(assume) if side else 0.0
         side = (side or -1) * (-1 if self.mirrored else 1)

@@ -25,6 +25,7 @@ import numpy as np
 from planner.nc.arcs import IN_PLANE, in_plane
 from planner.nc.language import swivel, tree
 from planner.nc.language.making import Given, Maker, Making, Row, around, equal_steps
+from planner.nc.language.rows import require
 from planner.nc.language.source import SourceLine
 
 AXES = "XYZ"
@@ -48,9 +49,8 @@ def statements(code: str, words: tree.Words, line: SourceLine) -> tuple[list[tre
     else_set = "else by a setting of the control; write the"
     if code == "G51" and not own.keys() & set("PIJK"):
         raise line.fault(f"scaling is by a factor P, or I, J and K, {else_set} scaled coordinates out")
-    if code == "G68" and "R" not in own:
-        what = "rotating the coordinate system is by an angle R"
-        raise line.fault(f"{what}, {else_set} rotated coordinates out")
+    what = "rotating the coordinate system is by an angle R"
+    line.require(code != "G68" or "R" in own, f"{what}, {else_set} rotated coordinates out")
     if code == "G68" and own.keys() & set("IJK"):
         raise line.fault("G68 with I J K turns about an axis in space, and tilts the plane; write moves out")
     return [tree.made(line.place, MAKERS[code], **given)], rest
@@ -82,14 +82,12 @@ def _set(making: Making, code: str, given: Given) -> None:
         parts.rotation = 0.0
     elif code == "G51":
         factors = [given.get(letter, given.get("P", 1.0)) for letter in "IJK"]
-        if 0.0 in factors:
-            raise ValueError("a scale of 0 makes a point of everything")
+        require(0.0 not in factors, "a scale of 0 makes a point of everything")
         parts.scale, parts.centre = np.array(factors), centre
     elif code == "G50":
         parts.scale = np.ones(3)
     elif code in _MIRRORS:
-        if not named:
-            raise ValueError(f"{code} needs the axes that it mirrors, and where: {code} X0")
+        require(named, f"{code} needs the axes that it mirrors, and where: {code} X0")
         parts.mirror[named], parts.mirrored_at[named] = -1.0, centre[named]
     else:
         parts.mirror[named or slice(None)] = 1.0

@@ -14,6 +14,7 @@ from planner.base.arrays import FloatArray
 from planner.nc import lathe_cuts, turning
 from planner.nc.faults import Notes
 from planner.nc.language.making import Given, Maker, Making, Row
+from planner.nc.language.rows import require
 from planner.nc.program import Kind, Program
 from planner.nc.turning import Leg
 
@@ -193,8 +194,7 @@ def _contour_of(program: Program, offset: FloatArray, start: complex) -> turning
     legs, arcs = [], iter(zip(program.arc_center, program.arc_normal, program.arc_sweep, strict=True))
     for kind, end in zip(program.kind.tolist(), program.end, strict=True):
         for kinds, what in _WRONG.items():
-            if kind in kinds:
-                raise ValueError(f"{what} in the profile of a cycle; write it after the cycle")
+            require(kind not in kinds, f"{what} in the profile of a cycle; write it after the cycle")
         point = complex(end[2] - offset[2], end[0] - offset[0])
         if kind == Kind.ARC:
             centre, normal, sweep = next(arcs)
@@ -204,10 +204,8 @@ def _contour_of(program: Program, offset: FloatArray, start: complex) -> turning
             legs.append(Leg(point, 1 if sweep > 0 else -1, middle))
         else:
             legs.append(Leg(point, fast=kind == Kind.RAPID))
-    if not legs:
-        raise ValueError("the profile of the cycle has no moves")
-    if legs[0].turning:
-        raise ValueError("the first move of a profile is straight: G0 or G1 to its first point")
+    require(legs, "the profile of the cycle has no moves")
+    require(not legs[0].turning, "the first move of a profile is straight: G0 or G1 to its first point")
     return turning.Contour(start, legs[0].fast, tuple(legs))
 
 

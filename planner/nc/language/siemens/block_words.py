@@ -161,8 +161,7 @@ class BlockWords(Commands):
 
     def _circle(self, reader: LineTokens, row: Row) -> None:
         """The arc of CIP or CT, which takes the row's coordinates and feed."""
-        if not row.arc:
-            raise reader.fault(EACH_LINE, 0)
+        reader.require(row.arc, EACH_LINE, 0)
         given = self._absolutes(row.take("XYZF"))
         self.body.append(tree.made(reader.place, _ARCS[row.arc], **row.through, **given))
 
@@ -195,8 +194,7 @@ class BlockWords(Commands):
     def _code(self, reader: LineTokens, code: int, at: int) -> list[tree.Word]:
         if code in (90, 91):
             self.absolute = code == 90
-            if reader.peek() == "(":
-                raise reader.fault(f"G{code}(...) is not read")
+            reader.require(reader.peek() != "(", f"G{code}(...) is not read")
         self.normal = PLANES.get(code, self.normal)
         if code in (70, 71, 700, 710):
             self.unit = MM_PER_INCH if code in (70, 700) else 1.0
@@ -213,9 +211,8 @@ class BlockWords(Commands):
             return [tree.word("G", at, float(code))]
         if code in (74, 75):
             return self._home(reader, code, at)
-        if code not in tables.CODES:
-            text = f"G{code}: no G code of a Sinumerik that is read; write what it does there in other codes"
-            raise reader.fault(text, at - reader.start)
+        text = f"G{code}: no G code of a Sinumerik that is read; write what it does there in other codes"
+        reader.require(code in tables.CODES, text, at - reader.start)
         more = []
         if code >= tables.SYSTEMS_FURTHER + 5 and tables.CODES[code] == (54.1,):
             more = [tree.word("P", at, float(code - tables.SYSTEMS_FURTHER))]
@@ -228,8 +225,7 @@ def _skip(reader: LineTokens) -> None:
     """Go past what stands in brackets behind a command, and behind its equals sign."""
     depth = 0
     while reader.peek() in ("(", "[") or depth:
-        if reader.ended:
-            raise reader.fault(") is missing")
+        reader.require(not reader.ended, ") is missing")
         found = reader.pop().text
         depth += (found in ("(", "[")) - (found in (")", "]"))
     if reader.take("="):

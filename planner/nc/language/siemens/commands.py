@@ -187,9 +187,9 @@ class Commands(Control):
         reader.expect(")")
         if letter in "IJK":
             return value - position("XYZ"["IJK".index(letter)]) if kind == "AC" else value
-        if letter not in "XYZABC" or (kind not in ("AC", "IC") and letter in "XYZ"):
-            text = "AC and IC stand with X Y Z A B C and I J K; DC, ACP, ACN with A B C"
-            raise reader.fault(text, at - reader.start)
+        good = letter in ("XYZABC" if kind in ("AC", "IC") else "ABC")
+        text = "AC and IC stand with X Y Z A B C and I J K; DC, ACP, ACN with A B C"
+        reader.require(good, text, at - reader.start)
         here = position(letter)
         if kind in ("DC", "ACP", "ACN"):  # the shortest way there, or that in a direction
             way = here - value if kind == "ACN" else value - here
@@ -211,8 +211,7 @@ class Commands(Control):
     def _call(self, reader: LineTokens) -> None:
         name, given = reader.pop().text, self._arguments(reader)
         times = reader.times()
-        if not reader.ended:
-            raise reader.fault(f"{reader.peek()} is not expected behind the call of {name}")
+        reader.require(reader.ended, f"{reader.peek()} is not expected behind the call of {name}")
         self._append_call(reader, name, given, times)
 
     def _call_text(self, reader: LineTokens) -> None:
@@ -221,8 +220,7 @@ class Commands(Control):
             self._call_block(reader)
             return
         bracket = reader.take("(")
-        if reader.kind() != "text":
-            raise reader.fault('CALL is followed by the name of a subprogram: CALL "HOLES"')
+        reader.require(reader.kind() == "text", 'CALL is followed by the name of a subprogram: CALL "HOLES"')
         text = reader.pop().text.strip('"')
         if bracket:
             reader.expect(")")
@@ -237,8 +235,7 @@ class Commands(Control):
             text = f"{name} is assumed not to move anything, as the machine file or --ignore says"
             self.body.append(tree.Message(reader.place, (text,)))
             return
-        if len(given) > _NAMES_MAX:
-            raise reader.fault(f"a subprogram takes at most {_NAMES_MAX} values", 0)
+        reader.require(len(given) <= _NAMES_MAX, f"a subprogram takes at most {_NAMES_MAX} values", 0)
         place = reader.place
         values = [tree.ZERO if one is None else one for one in given]
         values += [tree.ZERO] * (_NAMES_MAX - len(given) if given else 0)
@@ -272,8 +269,7 @@ class Commands(Control):
             way = [_polar("rp") * tree.op(part, _polar("ap")) for part in ("COS", "SIN")]
         else:
             way = [given.get(axis, tree.ZERO) for axis in plane]
-        if set(given) - {*plane, "G"}:
-            raise reader.fault("a pole lies in the plane (G17, G18, G19)", 0)
+        reader.require(not set(given) - {*plane, "G"}, "a pole lies in the plane (G17, G18, G19)", 0)
         pairs = ((_polar(axis), one + step) for axis, one, step in zip(plane, base, way, strict=True))
         self.body.append(tree.assign(reader.place, *pairs))
 
@@ -301,9 +297,8 @@ class Commands(Control):
                 reader.expression()
         if reader.take("FP"):
             reader.expect("=")
-            if reader.expression() != tree.ONE:
-                text = "G75 FP other than 1 is not read; write its position with SUPA"
-                raise reader.fault(text, at - reader.start)
+            text = "G75 FP other than 1 is not read; write its position with SUPA"
+            reader.require(reader.expression() == tree.ONE, text, at - reader.start)
         words = [(axis, tree.ZERO) for axis in axes]
         self.body.append(tree.row(reader.place, ("G", 91.0), ("G", 28.0 if code == 74 else 30.0), *words))
         return [tree.word("G", at, 90.0 if self.absolute else 91.0)]

@@ -40,8 +40,7 @@ class Control(LineParser):
         return self.begin(tree.OpenStatement(kind, reader.place, condition))
 
     def _close(self, kind: str, reader: LineTokens) -> tree.OpenStatement:
-        if not self.open or self.open[-1].kind != kind:
-            raise reader.fault(f"there is no {kind} open that this ends", 0)
+        reader.require(self.open and self.open[-1].kind == kind, f"there is no {kind} open that this ends", 0)
         return self.close()
 
     def _if(self, reader: LineTokens) -> None:
@@ -111,8 +110,7 @@ class Control(LineParser):
     def _lines_between(self, reader: LineTokens, first: str, last: str) -> list[tree.Statement]:
         """The statements from a label to the line of another one."""
         for name in (first, last):
-            if name not in self.lines:
-                raise reader.fault(f"there is no label {name} above this line", 0)
+            reader.require(name in self.lines, f"there is no label {name} above this line", 0)
         body, begin, end = *self.lines[first][:2], self.lines[last][2]
         found: list[tree.Statement] = [one for one in body[begin:end] if not isinstance(one, tree.Label)]
         jumps = any(isinstance(one, tree.Goto) for one in tree.statements_in(found))
@@ -132,8 +130,7 @@ class Control(LineParser):
         """The label of a repeat, a second one, its counter, and how often. Raises ProgramFault for unknown
         labels."""
         label, last = reader.pop().text, ""
-        if label not in self.labels:
-            raise reader.fault(f"there is no label {label} above this line", 0)
+        reader.require(label in self.labels, f"there is no label {label} above this line", 0)
         if reader.peek() in self.labels:
             last = reader.pop().text
         times = reader.times()
@@ -145,8 +142,7 @@ class Control(LineParser):
         self.add_loop(closed, tree.op("NOT", reader.expression()), "do")
 
     def _jump(self, reader: LineTokens) -> tree.Goto:
-        if reader.ended:
-            raise reader.fault("a label is expected here")
+        reader.require(not reader.ended, "a label is expected here")
         label = reader.pop().text.strip('"').upper()
         return tree.Goto(reader.place, tree.number(self._number_of(label)))
 
@@ -158,8 +154,7 @@ class Control(LineParser):
         otherwise: list[tree.Statement] = []
         while not reader.ended:
             condition = None if reader.take("DEFAULT") else tree.op("EQ", value, reader.value())
-            if not reader.peek().startswith("GOTO"):
-                raise reader.fault("GOTOF or GOTOB and a label are expected here")
+            reader.require(reader.peek().startswith("GOTO"), "GOTOF or GOTOB and a label are expected here")
             reader.pop()
             body: list[tree.Statement] = [self._jump(reader)]
             if condition is None:
@@ -177,8 +172,7 @@ class Control(LineParser):
         if kind == "STRING":
             self._sizes(reader)
         while True:
-            if reader.kind() not in ("name", "word"):
-                raise reader.fault("the name of a variable is expected here")
+            reader.require(reader.kind() in ("name", "word"), "the name of a variable is expected here")
             name = reader.pop().text
             self._declare(reader, name, kind)
             if not reader.take(","):
@@ -258,14 +252,12 @@ class Control(LineParser):
             is_text = reader.kind() == "text" or self.names.get(reader.peek()) == TEXT
             reader.next += is_text
             given.append(None if is_text or reader.peek() == "," else reader.expression())
-            if not reader.take(",") and reader.peek() != ")":
-                raise reader.fault(") is missing")
+            reader.require(reader.take(",") or reader.peek() == ")", ") is missing")
         return given
 
     def _procedure(self, reader: LineTokens) -> None:
         """PROC NAME([VAR] type name, ...) and its attributes. What VAR names is the caller's behind it."""
-        if reader.kind() not in ("name", "word"):
-            raise reader.fault("PROC is followed by the subprogram's name")
+        reader.require(reader.kind() in ("name", "word"), "PROC is followed by the subprogram's name")
         reader.pop()
         taken: list[tuple[tree.Parameter, tree.Expression]] = []
         if reader.take("("):
@@ -281,8 +273,7 @@ class Control(LineParser):
                 k, back = len(taken), tree.ONE if by_name else tree.ZERO
                 taken.append((variable(name), handed_over(k)))
                 self.handed_back += [(handed_over(k), variable(name)), (changed(k), back)]
-                if not reader.take(",") and reader.peek() != ")":
-                    raise reader.fault(") is missing")
+                reader.require(reader.take(",") or reader.peek() == ")", ") is missing")
         reader.leave()  # SAVE, DISPLOF and others
         if taken:
             self.body.append(tree.assign(reader.place, *taken))

@@ -45,6 +45,7 @@ from planner.nc.language.making import (
     pecked,
     tapped,
 )
+from planner.nc.language.rows import require
 
 _DEPTH = ("RTP", "RFP", "SDIS", "DP", "DPR")
 _CUTTING = ("MID", "FAL", "FALD", "FFP1", "FFD", "CDIR", "VARI", "MIDA", "AP1")
@@ -84,14 +85,12 @@ _SAID = "{0}: passes and allowances are those of the cycle, the single paths thi
 def _required(name: str, given: Container[str], *keys: str) -> None:
     """Raises ValueError for arguments that a cycle lacks."""
     for key in keys:
-        if key not in given:
-            raise ValueError(f"{name} needs {key}")
+        require(key in given, f"{name} needs {key}")
 
 
 def _require_depth(name: str, given: Container[str], absolute: str, below: str) -> None:
     """Raises ValueError where neither of two arguments gives a depth."""
-    if absolute not in given and below not in given:
-        raise ValueError(f"{name} needs {absolute} or {below}")
+    require(absolute in given or below in given, f"{name} needs {absolute} or {below}")
 
 
 def _depth_of(given: Given, absolute: str, below: str) -> float:
@@ -135,8 +134,7 @@ def _in_seconds(making: Making, given: Given) -> Given:
 
 def _lead(given: Given, unit: float) -> float:
     size, lead = given.get("MPIT", 0.0), given.get("PIT", 0.0)
-    if size and lead:
-        raise ValueError("MPIT and PIT both give the lead; write one of them")
+    require(not size or not lead, "MPIT and PIT both give the lead; write one of them")
     return lead or (coarse_lead(abs(size), unit) * (1.0 if size > 0.0 else -1.0) if size else 0.0)
 
 
@@ -182,8 +180,7 @@ def _bored(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
 
 def _deep(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
     less, last, apart = given.get("DAM", 0.0), given.get("DTD", 0.0), _APART / making.unit
-    if less < 0.0:
-        raise ValueError("DAM below 0 of CYCLE83, infeeds as shares, is not read; give their difference")
+    require(less >= 0.0, "DAM below 0 of CYCLE83, infeeds as shares, is not read; give their difference")
     pecks = Pecks(
         max(hole.top - _depth_of(given, "FDEP", "FDPR"), _SHORT),
         back=given.get("VRT", 0.0) or apart,
@@ -230,9 +227,8 @@ def _pocket(making: Making, given: Given, *, name: str) -> Iterator[Row]:
     """POCKET3 and POCKET4. Raises ValueError."""
     _required(name, given, "RTP", "RFP", "SDIS", "DP", "PA", "PO", "FFP1", "CDIR", "VARI")
     for key in ("AP1", "AP2", "AD"):
-        if given.get(key):
-            text = f"{key} of {name}, a pocket that is there already, is not read; leave it out"
-            raise ValueError(text)
+        text = f"{key} of {name}, a pocket that is there already, is not read; leave it out"
+        require(not given.get(key), text)
     radius = making.tool_radius()
     plan = _cutting(making, name, given, radius)
     making.assume(_SAID.format(name))
@@ -246,15 +242,13 @@ def _shape(name: str, given: Given, radius: float) -> milling.PocketShape:
     if name == "POCKET4":
         _required(name, given, "PRAD")
         size = given["PRAD"]
-        if size <= 0.0:
-            raise ValueError("PRAD, the radius of POCKET4, is to be above 0")
+        require(size > 0.0, "PRAD, the radius of POCKET4, is to be above 0")
         return milling.RoundedRectangle(size, size, size)
     _required(name, given, "LENG", "WID")
     corner = given.get("CRAD", 0.0) or radius
     if min(given["LENG"], given["WID"]) <= 0.0:
         raise ValueError("LENG and WID of POCKET3 are to be above 0; dimensions from a corner are not read")
-    if corner < radius:
-        raise ValueError(f"the corners of POCKET3 have a radius of {corner:g}; the tool has {radius:g}")
+    require(corner >= radius, f"the corners of POCKET3 have a radius of {corner:g}; the tool has {radius:g}")
     a, b = given["LENG"] / 2.0, given["WID"] / 2.0
     if corner > min(a, b):
         raise ValueError(f"the corners of POCKET3 have a radius of {corner:g}: more than half its width")
@@ -322,6 +316,5 @@ _CYCLES: dict[str, Cycle] = {
 
 def cycle_rows(making: Making, given: Given, *, name: str) -> Iterator[Row]:
     """The rows of a cycle in G17, with G90 and the feed as before. Raises ValueError."""
-    if making.interpreter.state.normal != 2:
-        raise ValueError(f"{name} in G18 or G19 is not read; write G17 before it")
+    require(making.interpreter.state.normal == 2, f"{name} in G18 or G19 is not read; write G17 before it")
     return around(making, _CYCLES[name](making, _in_seconds(making, given)), feed=False)

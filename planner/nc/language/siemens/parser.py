@@ -119,8 +119,7 @@ class SiemensParser(BlockWords):
         if read is not None:
             reader.pop()
             read(self, reader)
-            if not reader.ended:
-                raise reader.fault(f"{reader.peek()} is not expected here")
+            reader.require(reader.ended, f"{reader.peek()} is not expected here")
         elif reader.peek() not in COMMANDS and self._is_call(reader):
             self._call(reader)
         else:

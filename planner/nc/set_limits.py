@@ -52,6 +52,7 @@ _AXES = EVERY_AXIS + EXTRUDER
 _LIMITING = ("velocity", "accel")
 FEED = "feed"  # what VELOCITY bounds beside the axes
 _XYZ = "xyz"
+_Kept = tuple[State, FloatArray]  # what SAVE_GCODE_STATE and G60 keep, with the `shift` of SET_GCODE_OFFSET
 
 
 class LimitsInForce:
@@ -184,9 +185,7 @@ class SavedStates:
     """States by their names; `shift` (3,) is that of SET_GCODE_OFFSET [mm]."""
 
     def __init__(self) -> None:
-        self.kept: dict[
-            str, tuple[State, FloatArray]
-        ] = {}  # what SAVE_GCODE_STATE and G60 keep, with `shift`
+        self.kept: dict[str, _Kept] = {}
         self.shift = np.zeros(3)
         self.marks: list[tuple[int, str, bool]] = []  # row, name, and whether the state is brought back
 
@@ -202,7 +201,7 @@ class SavedStates:
             back = self.kept.get({RESTORE: "S", "G61": "G"}[name] + setting.slot)
             if back is None:
                 raise WordFault(setting.word, f"{name} of a state that was not kept before it")
-            self._restore(setting, *back, state, table, line)
+            self._restore(setting, back, state, table, line)
         elif name == PLACE:
             here = state.programmed()
             for axis, letter in enumerate(_XYZ):
@@ -226,10 +225,8 @@ class SavedStates:
         state.g92[axes] = self.shift[axes]
         state.apply_offsets()
 
-    def _restore(
-        self, setting: Setting, back: State, shift: FloatArray, state: State, table: BlockTable, line: int
-    ) -> None:
-        given = setting.values
+    def _restore(self, setting: Setting, kept: _Kept, state: State, table: BlockTable, line: int) -> None:
+        given, (back, shift) = setting.values, kept
         if setting.name == "G61":
             speed = given["f"] * state.unit / SECONDS_PER_MINUTE if "f" in given else None
             target = state.position.copy()

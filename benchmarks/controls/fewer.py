@@ -25,10 +25,10 @@ from planner.commands.smooth import ROOM, SHARE, compared
 from planner.controls.export.fewer import fewer_lines
 from planner.controls.timing.times import control_times
 from planner.machine import Machine, load_machine
-from planner.nc.language.flat import flat_program
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
 from planner.nc.reading import AS_USUAL
+from planner.nc.writer import flat_program
 
 SHARED = Path(os.environ.get("PLANNER_SHARED", ROOT.parent / "shared"))
 ROOMS = (

@@ -150,8 +150,7 @@ def _further(
     text: bytes, machine: Any, reading: Any, source: str, program: Any, faulty: bool
 ) -> Iterator[Any]:
     from planner.nc.info import describe
-    from planner.nc.language.flat import flat_program
-    from planner.nc.writer import retimed
+    from planner.nc.writer import flat_program, retimed
 
     yield repr(describe(program, lines=1, unsupported=()))
     if faulty:

@@ -16,7 +16,7 @@ from planner.nc.language.heidenhain import definitions, moves
 from planner.nc.language.heidenhain import flow as conversational_flow
 from planner.nc.language.heidenhain import tables as conversational
 from planner.nc.language.making import ASSUMED
-from planner.nc.language.siemens import block_words, cycles, patterns, tables
+from planner.nc.language.siemens import block_words, cycles, parser, tables
 
 PAGE = RESULTS / "constructs.md"
 READ, SAID, NOTHING, REFUSED = "read", "said first", "moves nothing", "refused"
@@ -29,7 +29,7 @@ def rows() -> dict[str, list[Row]]:
     siemens: list[Row] = [(f"G{code}", READ, "") for code in sorted({*tables.CODES, 74, 75, 331, 332, 63})]
     siemens += [
         (name, READ, "")
-        for name in sorted({*commands, *cycles.ARGUMENTS, *patterns.PATTERNS, *tables.TOOL_POINT})
+        for name in sorted({*commands, *cycles.ARGUMENTS, *parser.PATTERNS, *tables.TOOL_POINT})
     ]
     siemens += [(name, SAID, ASSUMED[why]) for name, why in sorted(tables.SAID.items())]
     siemens += [(name, NOTHING, "") for name in sorted(tables.IDLE)]

@@ -52,8 +52,8 @@ def expand_command(
     """Write a program out: parameters, expressions, loops and calls become lines that every control reads."""
     if force and output is None:
         raise InputError("--force has no effect without a file to write; name one with -o FILE")
-    from planner.nc.language.flat import flat_program
     from planner.nc.reader import load, source_name
+    from planner.nc.writer import flat_program
     from planner.report.replace import refuse_inputs, write_new
 
     data = load(job)

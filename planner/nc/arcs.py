@@ -23,6 +23,7 @@ from planner.base.units import MM_PER_INCH
 
 AXES = "xyz"
 IN_PLANE = {2: (0, 1), 1: (2, 0), 0: (1, 2)}  # the plane's axes by its normal, right-handed
+PLANES: dict[float, int] = {17: 2, 18: 1, 19: 0}  # normals by the G codes of their planes
 # By programmed unit [mm]; LinuxCNC's own numbers, found again by bisection on it.
 CLOSURE = {1.0: 0.02 * math.sqrt(2.0), MM_PER_INCH: 0.002 * math.sqrt(2.0) * MM_PER_INCH}
 RADIUS_MIN = {1.0: 0.00127, MM_PER_INCH: 0.00005 * MM_PER_INCH}

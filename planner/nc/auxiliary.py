@@ -223,7 +223,7 @@ def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, 
     if "P" not in block.value and not state.strict:  # Fanuc's
         for letter in block.value.keys() & set("XU"):
             block.value["P"], block.at["P"] = block.value.pop(letter), block.at[letter]
-            ignored.used(letter)
+            ignored.used[letter] += 1
     seconds = block.value.get("P")
     if seconds is not None and "S" in block.value and ignored.printer:
         seconds = block.value["S"]

@@ -50,7 +50,7 @@ def command(words: Words, word: int, block: Block, ignored: IgnoredWords) -> boo
         return False
     at = int(words.at[word])
     text = words.data[at : words.line_at(at)[1]].decode("utf-8", "replace").split(";")[0].strip()
-    if ignored.ignores(text.upper()[:2]) or (text[:1] == "$" and ignored.ignores("$")):
+    if text.upper()[:2] in ignored.reading.ignore or (text[:1] == "$" and "$" in ignored.reading.ignore):
         ignored.count(_IGNORED, text, block.line)
         return True
     if pair := _JSON.fullmatch(text):
@@ -170,7 +170,7 @@ def _settle(words: Words, word: int, row: tuple[int, int], block: Block, ignored
     before = letters[: word - row[0]].replace("N", "").replace("M", "")
     behind = re.split("[GM]", letters[word + 1 - row[0] :], maxsplit=1)[0]  # up to the next code
     found = settings.setting(letter, code, before, behind)
-    if ignored.ignores(name):
+    if name in ignored.reading.ignore:
         probes = letter == "G" and code in settings.PROBES
         ignored.count(settings.PROBING if probes else settings.LEFT_OUT_BY_USER, name, block.line)
         block.stops, block.refused_motion = probes, probes
@@ -231,7 +231,7 @@ def _check_used(words: Words, block: Block, report: Report, ignored: IgnoredWord
         del block.value["P"]
     in_force = "" if "motion" in block.g or "cycle end" in block.g else codes.MOTION_WORDS
     if "E" in block.uses:
-        ignored.used("E")
+        ignored.used["E"] += 1
     for letter in sorted(block.value.keys() - block.uses - _ALWAYS - set(in_force), key=block.at.__getitem__):
         if letter in "DH" and not ignored.strict:
             ignored.count(OFFSET_NUMBER, words.text(block.at[letter]), block.line)

@@ -94,7 +94,7 @@ def with_extruder(
     row     : (B,) that each block comes from
     words   : of the program; of these the first `rows` rows
     factors : by which F counts from a row on (M220)
-    states  : row, name, and whether it is brought back, of the states that are kept (saved_states.py)
+    states  : row, name, and whether it is brought back, of the states that are kept (set_limits.py)
     retractions : how G10 and G11 feed from a row on
     """
     _check_flows(words, rows, program.source)

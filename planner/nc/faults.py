@@ -5,6 +5,7 @@ them. An axis that is not planned may be named as long as it does not move: all 
 after G91 they are 0. The compiled loop (plain.py) checks it by `treatment` and `parked`.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -130,13 +131,6 @@ def require_none(faults: Sequence[Fault], source: str) -> None:
     raise InputError(text, source=first.source or source, line=first.line, column=first.column)
 
 
-@dataclass(slots=True)
-class _Counted:
-    times: int
-    word: str
-    line: int
-
-
 class IgnoredWords:
     """Assumptions so far in one program."""
 
@@ -154,10 +148,11 @@ class IgnoredWords:
         self.treatment = np.full(256, READ, dtype=np.uint8)  # by letter
         for letter in LETTERS_REFUSED:
             self.treatment[ord(letter)] = AXIS if letter in axes else self._treatment(letter)
-        self._counted: dict[Assumption, _Counted] = {}
+        self._first: dict[Assumption, tuple[str, int]] = {}  # word and line where each was met first
+        self._times = Counter[Assumption]()
         # letters of axes that are not planned and were refused, because they move
         self.moved: set[str] = set()
-        self._used: dict[str, int] = {}
+        self.used = Counter[str]()  # words that a code uses: they are not left out
 
     def _treatment(self, letter: str) -> int:
         left_out = self.follows or self.reading.extruder == IGNORE
@@ -184,11 +179,8 @@ class IgnoredWords:
         turning = (self.treatment[[ord(letter) for letter in "ABC"]] == AXIS).any()
         if turning and word.upper().lstrip("M0") in ("128", "428"):
             what = TOOL_POINT_M
-        self._counted.setdefault(what, _Counted(0, word, line)).times += times
-
-    def ignores(self, name: str) -> bool:
-        """True if the user said that a code or command is harmless."""
-        return name in self.reading.ignore
+        self._first.setdefault(what, (word, line))
+        self._times[what] += times
 
     def may_stand(self, letter: str, value: float, *, absolute: bool) -> bool:
         """True if a word of an axis that is not planned leaves it where its first word put it."""
@@ -199,15 +191,11 @@ class IgnoredWords:
             self.parked[code] = value
         return bool(self.parked[code] == value)
 
-    def used(self, letter: str) -> None:
-        """A code uses a word of this letter: it is not left out."""
-        self._used[letter] = self._used.get(letter, 0) + 1
-
     def count_letters(self, words: Words, rows: int) -> None:
         """Count the words of letters that were left out or parked in the first `rows` rows of a chunk."""
         letter = words.letter[: words.first[rows]]
         for code in np.flatnonzero((self.treatment == LEFT_OUT) | (self.treatment == PARKED)):
-            times = int(np.count_nonzero(letter == code)) - self._used.pop(chr(code), 0)
+            times = int(np.count_nonzero(letter == code)) - self.used.pop(chr(code), 0)
             of_commands = self.printer and self.treatment[code] == PARKED and np.isnan(self.parked[code])
             if of_commands or (chr(code) == "E" and self.follows):
                 continue
@@ -230,8 +218,11 @@ class IgnoredWords:
 
     def notes(self) -> list[Note]:
         """Everything that was assumed, by its first line."""
-        notes = []
-        for what, of in self._counted.items():
-            text = f"{what.named(of.times)}: {what.meaning}; first {of.word} line {of.line}"
-            notes.append(Note(of.line, text, what.changes))
-        return notes
+        return [
+            Note(
+                line,
+                f"{what.named(self._times[what])}: {what.meaning}; first {word} line {line}",
+                what.changes,
+            )
+            for what, (word, line) in self._first.items()
+        ]

@@ -17,22 +17,23 @@ import numpy as np
 
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
-from planner.nc import auxiliary, codes, mover, moves, offsets
+from planner.nc import auxiliary, codes, moves, offsets
+from planner.nc.arcs import PLANES
 from planner.nc.block_reader import read_block
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import CutterFault
-from planner.nc.faults import FaultList, Findings, IgnoredWords, Notes
+from planner.nc.faults import FaultList, Findings, IgnoredWords
 from planner.nc.integers import DwellWords, integers_of
 from planner.nc.language.detect import Archived
 from planner.nc.lexer import Words
-from planner.nc.mover import COVET_AXES, Mover, go_home, go_to_switches
+from planner.nc.mover import COVET_AXES, Mover
 from planner.nc.moves import Block, WordFault
 from planner.nc.plain import run_plain
 from planner.nc.printer import OF_STATE
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
 from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
-from planner.nc.saved_states import SavedStates
-from planner.nc.set_limits import LimitsInForce
+from planner.nc.set_limits import LimitsInForce, SavedStates
+from planner.nc.splines import SplineReader
 from planner.nc.state import REFUSED_MOTION, State, begins_in_inches, state_of
 from planner.nc.tool_point import ToolPointSwitch, at_the_tip
 
@@ -52,24 +53,24 @@ class OpenArc(NamedTuple):
     centred: bool  # I J K are not all 0
 
 
-class Interpreter:
+class Interpreter(Mover):
     """Runs the words of one program, all at once or in chunks: `execute` for each; then `program()`,
-    `faults()`, `notes`. Between two chunks `state` and `table` say where the program stands.
+    `faults()`. Between two chunks `state` and `table` say where the program stands.
     """
 
     def __init__(self, machine: Machine | None, source: str, reading: Reading = AS_USUAL):
         self.source, self.reading = source, reading
         self.machine = machine
-        state = state_of(machine, reading.ignore)
+        state = self.state = state_of(machine, reading.ignore)
         state.strict, state.absolute_centre = reading.strict, reading.arc_centres == ABSOLUTE
         self.tool_point = ToolPointSwitch(machine)
         extruder, at_tip = machine is not None and EXTRUDER in machine.axes, self.tool_point.chain is not None
         self.ignored = IgnoredWords(reading, state.others, extruder=extruder, at_tip=at_tip)
-        table = BlockTable(len(state.letters))
-        table.keep_origin(state)
+        self.table = BlockTable(len(state.letters))
+        self.table.keep_origin(state)
         self.findings = Findings(strict=reading.strict)
-        feed_default = None if machine is None else machine.feed_default
-        self.mover = Mover(state, table, self.ignored, feed_default, self.findings)
+        self.feed_default = None if machine is None else machine.feed_default
+        self.splines = SplineReader()
         self.open_arcs: list[OpenArc] = []  # every arc that does not close
         self._dwells = DwellWords()
         self.limits = LimitsInForce()
@@ -86,26 +87,17 @@ class Interpreter:
         self.rows_read = 0  # of the last chunk, up to the end of the program
         self._units_known = False  # by a G20 or G21, or it was said that there was none before the first move
 
-    @property
-    def state(self) -> State:
-        """The modal state, and where the axes are."""
-        return self.mover.state
-
-    @property
-    def table(self) -> BlockTable:
-        """The blocks and events that have been made so far."""
-        return self.mover.table
-
     def program(self, frames: Sequence[Frame] = ()) -> Program:
         """The program that was read, if there are no faults; `frames` are the calls of an expanded one."""
         self._assume_feeds()
-        if self.mover.cutter is not None and self._words is not None:
+        if self.cutter is not None and self._words is not None:
             try:
-                self.mover.cutter.fix()  # the last move, if the program just ends while compensation is on
+                self.cutter.fix()  # the last move, if the program just ends while compensation is on
             except CutterFault as fault:
                 self.findings.faults.append((self._words, len(self._words.letter) - 1, str(fault)))
         limits = self.limits.throughout(self.table, self.machine, self.findings)
-        read = self.table.finish(self.source, self.notes, frames, self.reading, self.state.letters)
+        notes = self.findings.notes(self.ignored.notes())
+        read = self.table.finish(self.source, notes, frames, self.reading, self.state.letters)
         read = dataclasses.replace(read, limits=limits)
         return read if self.findings.faults else at_the_tip(read, self.tool_point, self.machine)
 
@@ -114,7 +106,7 @@ class Interpreter:
         if self.aside is not None:
             raise ValueError("a cycle stands in the profile of another one; write it behind that")
         self.aside = copy.deepcopy(self.state), self.table, place
-        self.mover.table = BlockTable(len(self.state.letters))
+        self.table = BlockTable(len(self.state.letters))
         # any feed does: moves whose feed depends on the diameter are divided
         self.state.feed_mode, self.state.feed, self.state.uncompensated = "per minute", 1.0, True
 
@@ -122,13 +114,8 @@ class Interpreter:
         """End what is executed aside, if anything is; the place of its cycle."""
         if self.aside is None:
             return None
-        (self.mover.state, self.mover.table, place), self.aside = self.aside, None
+        (self.state, self.table, place), self.aside = self.aside, None
         return place
-
-    @property
-    def notes(self) -> Notes:
-        """Assumptions and notes, each once, with its first line and how often."""
-        return self.findings.notes(self.ignored.notes())
 
     def in_seconds(self, words: Words) -> Words:
         """The next words of the program with the times of dwells in seconds, as `execute` takes them."""
@@ -143,7 +130,7 @@ class Interpreter:
         self.table.begin(len(words.letter))
         while row < rows and not self.ended:
             self.table.make_room(rows - row)
-            if not self.mover.splines.open:
+            if not self.splines.open:
                 after = run_plain(words, row, self.state, self.table, self.ignored)
                 self._begun, row = self._begun or after > row, after
             if row == rows:
@@ -165,7 +152,7 @@ class Interpreter:
             self._begun = True
         self.rows_read = row
         self._assume_units()
-        self.mover.splines.keep(words)
+        self.splines.keep(words)
         refused = self.table.refused_word[: self.table.refusals]
         letters = words.letter[refused]
         self.ignored.moved |= {chr(letter) for letter in np.flatnonzero(np.bincount(letters))}
@@ -189,7 +176,7 @@ class Interpreter:
 
     def faults(self) -> FaultList:
         """All faults in the order of the program; a line that is executed many times is named once."""
-        return FaultList(self.findings.faults + self.mover.splines.faults())
+        return FaultList(self.findings.faults + self.splines.faults())
 
     def _assume_units(self) -> None:
         moves = np.isin(self.table.block.kind[: self.table.blocks], MOVES)
@@ -224,19 +211,19 @@ class Interpreter:
             self.findings.report(fault.word, message)
         except CutterFault as fault:
             self.findings.report(min(block.at.values()), str(fault))
-            self.mover.cutter = self.state.actual = None  # what follows is read without compensation
+            self.cutter = self.state.actual = None  # what follows is read without compensation
         return block.m.get("stopping") in (20, 300)
 
     def _execute(self, block: Block) -> bool:
         """Execute one block; True if it ends the program."""
-        if self.mover.cutter is not None:
-            mover.check_unchanged(self.state, block)
+        if self.cutter is not None:
+            self.check_unchanged(block)
         for setting in block.settings:
             if setting.name in OF_STATE:
                 self.saved.take(setting, self.state, self.table, block.line)
             else:
                 self.limits.take(setting, self.state, self.table, block.line, self.findings)
-        mover.check_offsets(self.state, block, compensated=self.mover.cutter is not None)
+        self.check_offsets(block)
         self.state.numbers |= {c: block.value[c] for c in block.value.keys() & {"D", "H"}}
         assert self._words is not None
         printer = self.ignored.printer
@@ -249,20 +236,21 @@ class Interpreter:
         before = self.state.position.copy()
         if not block.foreign:
             self._check_parked(block)
-            go_to_switches(self.state, self.table, block, self.findings)
+            if block.homing:
+                self.go_to_switches(block)
             if block.homing and self.ignored.printer:  # ends their G92
                 self.saved.homed(["XYZ".index(axis) for axis in block.homing], self.state)
             moves.take_polar(self.state, block)
             self._one_shot(block)
             self.table.keep_origin(self.state)
-            self.mover.execute(block)
+            self.execute_motion(block)
             if self.two_axes and self.state.motion in (2, 3) and self.state.normal == 2 and block.has("Z"):
                 text = f"an arc with Z in the plane X/Y is a helix, though nothing moves Y; {_IF_LATHE}"
                 self.findings.assume(text, block.line, block.motion_word())
             self.tool_point.check(self.state, block, before)
         stop = block.m.get("stopping")
-        if stop is not None and self.mover.cutter is not None:
-            self.mover.cutter.fix()
+        if stop is not None and self.cutter is not None:
+            self.cutter.fix()
         if stop == 600:
             text = "a pallet change (M60) is a full stop; the axes are assumed to stand still"
             self.findings.assume(text, block.line, block.at["stopping"])
@@ -277,7 +265,7 @@ class Interpreter:
     def _modes(self, block: Block) -> None:
         state, g = self.state, block.g
         if "plane" in g:
-            state.normal, state.plane_known = {170: 2, 180: 1, 190: 0}[g["plane"]], True
+            state.normal, state.plane_known = PLANES[g["plane"] // 10], True
         if "units" in g:
             state.unit = MM_PER_INCH if g["units"] == 200 else 1.0
             self._assume_units()
@@ -285,7 +273,7 @@ class Interpreter:
         if "lathe diameter mode" in g:
             state.diameters = g["lathe diameter mode"] == 70
         if "cutter compensation" in g:
-            self.mover.cutter = mover.switch(state, self.table, block, self.mover.cutter, self.findings)
+            self.switch(block)
         if "tool length" in g:
             offsets.set_tool_offset(state, block, self.findings)
         self.tool_point.take(state, self.table, block)
@@ -313,7 +301,7 @@ class Interpreter:
             text = f"{name} and G{codes.number(motion)} both use the axis words of the line; write two lines"
             raise block.fault(text, "one-shot")
         if code in (280, 300):
-            go_home(self.state, self.table, block, self.findings)
+            self.go_home(block)
         elif code in (281, 301):  # where the machine stands becomes the position of G28 or G30
             self.state.homes[code - 1] = self.state.position.copy()
         elif code == 100:

@@ -5,7 +5,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.nc import auxiliary, codes, drilling, moves, offsets, threads
-from planner.nc.arcs import FULL_TURN
+from planner.nc.arcs import FULL_TURN, PLANES
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter
 from planner.nc.faults import Findings, IgnoredWords
@@ -28,143 +28,118 @@ _WHY_NO_MOTION = {
 }
 
 
-def check_unchanged(state: State, block: Block) -> None:
-    """Raise WordFault for words that must not stand in a block while compensation is on."""
-    for group in _REFUSED_GROUPS:
-        code = block.g.get(group, -1)
-        same = code == -1 or (group == "plane" and code == {2: 170, 1: 180, 0: 190}[state.normal])
-        block.require(same, _refusal(f"G{codes.number(code)}"), group)
-    one_shot = block.g.get("one-shot", -1)
-    sets_system = one_shot == 100 and block.value.get("L") in (2.0, 20.0)
-    number, in_force = round(block.value.get("P", 0.0)), state.system
-    of_force = number == 0 or (in_force in SYSTEMS and SYSTEMS.index(in_force) + 1 == number)
-    refused = one_shot in _REFUSED_ONE_SHOTS or (sets_system and of_force)
-    block.require(not refused, _refusal(f"G{codes.number(one_shot)}"), "one-shot")
-    if block.homing:
-        raise WordFault(min(block.at.values(), default=0), _refusal("homing"))
-    block.require("tool change" not in block.m, _refusal("M6"), "tool change")
-
-
-def check_offsets(state: State, block: Block, *, compensated: bool) -> None:
-    """Raise WordFault for a D or H alone that would bring another offset in on Fanuc's controls."""
-    if not state.fanuc or {"cutter compensation", "tool length"} & block.g.keys():
-        return
-    for letter, code, on in (("H", "G43", bool(state.tool_offset.any())), ("D", "G41 or G42", compensated)):
-        number = block.idle.get(letter, block.value.get(letter))
-        before = state.numbers.get(letter, number)
-        if on and letter not in block.uses and number is not None and number != before:
-            text = f"{letter}{number:g} while {letter}{before:g} is in force: the control takes its offset from here on"
-            raise block.fault(f"{text}; write {code} beside it", letter)
-
-
 def _refusal(name: str) -> str:
     return f"{name} while cutter radius compensation is on; write G40 before it"
-
-
-def switch(
-    state: State, table: BlockTable, block: Block, on: Cutter | None, findings: Findings
-) -> Cutter | None:
-    """The compensation after G40 to G42.1, given the one in force. Raises WordFault."""
-    code = block.g["cutter compensation"]
-    if code == _OFF:
-        if on is not None:
-            on.fix()
-            if not on.started:
-                state.actual = None
-        return None
-    name = f"G{codes.number(code)}"
-    block.require(on is None, _refusal(name), "cutter compensation")
-    text = f"{name} in the y z plane is not supported; write G17 or G18 before it"
-    block.require(state.normal != 0, text, "cutter compensation")
-    text = f"{name} in G18 while the work system is rotated is not supported"
-    block.require(state.normal != 1 or not state.rotated, text, "cutter compensation")
-    text = f"the edge orientation L of {name} is not supported; remove it and write the tool's path"
-    block.require("L" not in block.value, text, "L")
-    diameter = 0.0 if state.uncompensated else _diameter(state, block, code, findings)
-    if diameter == 0.0:
-        return None
-    left = (code in _LEFT) == (diameter > 0)
-    return Cutter(state, table, radius=abs(diameter) / 2.0, left=left, normal=state.normal)
-
-
-def _diameter(state: State, block: Block, code: int, findings: Findings) -> float:
-    """[mm]"""
-    name = f"G{codes.number(code)}"
-    if code in _DYNAMIC:
-        text = f"{name} needs the tool's diameter as a D word"
-        block.require("D" in block.value, text, "cutter compensation")
-        return block.value["D"] * state.unit
-    number = integer(block, "D", 0) if "D" in block.value else state.tool_loaded
-    tool = state.tools.get(number)
-    if tool is None or tool.diameter == 0.0:
-        text = f"{tool_name(number)} has no diameter in the machine file: {name} does not move the path"
-        findings.assume(text, block.line, block.at["cutter compensation"], grave=True)
-    return 0.0 if tool is None else tool.diameter
-
-
-def go_home(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
-    """All axes, or the block's (in its rotated system), go to the position of G28 or G30."""
-    code, word = block.g["one-shot"], block.at["one-shot"]
-    name = f"G{codes.number(code)}"
-    if code not in state.homes:
-        findings.assume(f"{name} has no position in the machine file: machine zero", block.line, word)
-    else:
-        offsets.assume_origin(state, name, block, findings)
-    if state.actual is not None:  # cutter radius compensation ends here
-        state.actual = None
-        table.add(Kind.RAPID, block.line, state)
-    home = state.homes.get(code, state.zeros())
-    if not block.has(state.letters):
-        state.position[:] = home
-    else:
-        state.position[:] = moves.target(state, block)
-        table.add(Kind.RAPID, block.line, state)
-        state.position[:] = _some_axes(state, block, home)
-    table.add(Kind.RAPID, block.line, state)
-
-
-def go_to_switches(state: State, table: BlockTable, block: Block, findings: Findings) -> None:
-    """Homing ($H, bare G28 of 3-D printers): `block.homing` goes to the position of G28, or machine zero."""
-    if not block.homing:
-        return
-    axes = ["XYZ".index(letter) for letter in block.homing]
-    state.position[axes] = state.homes.get(280, np.zeros(3))[axes]
-    table.add(Kind.RAPID, block.line, state)
-    text = "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not"
-    findings.assume(text, block.line)
-
-
-def _some_axes(state: State, block: Block, home: FloatArray) -> FloatArray:
-    """(A,) the position with the block's axes at home [mm]."""
-    system, there = state.work_system(), state.position.copy()
-    point, at_home = system.turn(there - system.origin, -1.0), system.turn(home - system.origin, -1.0)
-    for axis, letter in enumerate(state.letters):
-        if letter in block.value:
-            there[axis], point[axis] = home[axis], at_home[axis]
-    if state.rotated and block.has("XY"):
-        there[:2] = (system.origin + system.turn(point))[:2]
-    return there
 
 
 class Mover:
     """Executes the motion of blocks: moves the state, and appends to the table of blocks."""
 
-    def __init__(
-        self,
-        state: State,
-        table: BlockTable,
-        ignored: IgnoredWords,
-        feed_default: float | None,
-        findings: Findings,
-    ):
-        self.state, self.table, self.ignored = state, table, ignored
-        self.feed_default = feed_default  # of moves before the first F word [mm/s], or None
-        self.findings = findings
-        self.cutter: Cutter | None = None
-        self.splines = SplineReader()
-        self._before_cycles = NO_MOTION  # straight motion code that G80 leaves in force on Fanuc's controls
+    state: State  # the modal state, and where the axes are
+    table: BlockTable  # the blocks and events that have been made so far
+    ignored: IgnoredWords
+    findings: Findings
+    feed_default: float | None  # of moves before the first F word [mm/s], or None
+    splines: SplineReader
+    cutter: Cutter | None = None
+    _before_cycles = NO_MOTION  # straight motion code that G80 leaves in force on Fanuc's controls
 
-    def execute(self, block: Block) -> None:
+    def check_unchanged(self, block: Block) -> None:
+        """Raise WordFault for words that must not stand in a block while compensation is on."""
+        state = self.state
+        for group in _REFUSED_GROUPS:
+            code = block.g.get(group, -1)
+            same = code == -1 or (group == "plane" and PLANES[code // 10] == state.normal)
+            block.require(same, _refusal(f"G{codes.number(code)}"), group)
+        one_shot = block.g.get("one-shot", -1)
+        sets_system = one_shot == 100 and block.value.get("L") in (2.0, 20.0)
+        number, in_force = round(block.value.get("P", 0.0)), state.system
+        of_force = number == 0 or (in_force in SYSTEMS and SYSTEMS.index(in_force) + 1 == number)
+        refused = one_shot in _REFUSED_ONE_SHOTS or (sets_system and of_force)
+        block.require(not refused, _refusal(f"G{codes.number(one_shot)}"), "one-shot")
+        if block.homing:
+            raise WordFault(min(block.at.values(), default=0), _refusal("homing"))
+        block.require("tool change" not in block.m, _refusal("M6"), "tool change")
+
+    def check_offsets(self, block: Block) -> None:
+        """Raise WordFault for a D or H alone that would bring another offset in on Fanuc's controls."""
+        state, compensated = self.state, self.cutter is not None
+        if not state.fanuc or {"cutter compensation", "tool length"} & block.g.keys():
+            return
+        for letter, code, on in (("H", "G43", state.tool_offset.any()), ("D", "G41 or G42", compensated)):
+            number = block.idle.get(letter, block.value.get(letter))
+            before = state.numbers.get(letter, number)
+            if on and letter not in block.uses and number is not None and number != before:
+                text = f"{letter}{number:g} while {letter}{before:g} is in force: the control takes its offset from here on"
+                raise block.fault(f"{text}; write {code} beside it", letter)
+
+    def switch(self, block: Block) -> None:
+        """G40 to G42.1. Raises WordFault."""
+        state, code, on = self.state, block.g["cutter compensation"], self.cutter
+        if code == _OFF:
+            if on is not None:
+                on.fix()
+                if not on.started:
+                    state.actual = None
+            self.cutter = None
+            return
+        name = f"G{codes.number(code)}"
+        block.require(on is None, _refusal(name), "cutter compensation")
+        text = f"{name} in the y z plane is not supported; write G17 or G18 before it"
+        block.require(state.normal != 0, text, "cutter compensation")
+        text = f"{name} in G18 while the work system is rotated is not supported"
+        block.require(state.normal != 1 or not state.rotated, text, "cutter compensation")
+        text = f"the edge orientation L of {name} is not supported; remove it and write the tool's path"
+        block.require("L" not in block.value, text, "L")
+        diameter = 0.0 if state.uncompensated else self._diameter(block, code)
+        if diameter != 0.0:
+            left, radius = (code in _LEFT) == (diameter > 0), abs(diameter) / 2.0
+            self.cutter = Cutter(state, self.table, radius=radius, left=left, normal=state.normal)
+
+    def _diameter(self, block: Block, code: int) -> float:
+        """[mm]"""
+        name = f"G{codes.number(code)}"
+        if code in _DYNAMIC:
+            text = f"{name} needs the tool's diameter as a D word"
+            block.require("D" in block.value, text, "cutter compensation")
+            return block.value["D"] * self.state.unit
+        number = integer(block, "D", 0) if "D" in block.value else self.state.tool_loaded
+        tool = self.state.tools.get(number)
+        if tool is None or tool.diameter == 0.0:
+            text = f"{tool_name(number)} has no diameter in the machine file: {name} does not move the path"
+            self.findings.assume(text, block.line, block.at["cutter compensation"], grave=True)
+        return 0.0 if tool is None else tool.diameter
+
+    def go_home(self, block: Block) -> None:
+        """All axes, or the block's (in its rotated system), go to the position of G28 or G30."""
+        state, code = self.state, block.g["one-shot"]
+        name = f"G{codes.number(code)}"
+        if code not in state.homes:
+            text = f"{name} has no position in the machine file: machine zero"
+            self.findings.assume(text, block.line, block.at["one-shot"])
+        else:
+            offsets.assume_origin(state, name, block, self.findings)
+        if state.actual is not None:  # cutter radius compensation ends here
+            state.actual = None
+            self.table.add(Kind.RAPID, block.line, state)
+        home = state.homes.get(code, state.zeros())
+        if not block.has(state.letters):
+            state.position[:] = home
+        else:
+            state.position[:] = moves.target(state, block)
+            self.table.add(Kind.RAPID, block.line, state)
+            state.position[:] = _some_axes(state, block, home)
+        self.table.add(Kind.RAPID, block.line, state)
+
+    def go_to_switches(self, block: Block) -> None:
+        """Homing ($H, bare G28 of 3-D printers): `block.homing` goes to the position of G28, or machine zero."""
+        axes = ["XYZ".index(letter) for letter in block.homing]
+        self.state.position[axes] = self.state.homes.get(280, np.zeros(3))[axes]
+        self.table.add(Kind.RAPID, block.line, self.state)
+        text = "homing is planned as a rapid to the machine's g28 position, or machine zero; the search for the switches is not"
+        self.findings.assume(text, block.line)
+
+    def execute_motion(self, block: Block) -> None:
         """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault."""
         state, code = self.state, block.g.get("motion")
         if code is not None:  # stays in force, until another one or G80
@@ -307,3 +282,15 @@ class Mover:
         (points, weights), line = found
         state.position[:3] = points[-1, -1]
         self.table.add_spline(points, weights, line, state)
+
+
+def _some_axes(state: State, block: Block, home: FloatArray) -> FloatArray:
+    """(A,) the position with the block's axes at home [mm]."""
+    system, there = state.work_system(), state.position.copy()
+    point, at_home = system.turn(there - system.origin, -1.0), system.turn(home - system.origin, -1.0)
+    for axis, letter in enumerate(state.letters):
+        if letter in block.value:
+            there[axis], point[axis] = home[axis], at_home[axis]
+    if state.rotated and block.has("XY"):
+        there[:2] = (system.origin + system.turn(point))[:2]
+    return there

@@ -8,7 +8,7 @@ With q the position in a work system before G92 is taken off (state.py), a coord
 and "the place where the machine stands gets the coordinate x" is solved for the offset in question: G92 for
 the G92 offset, G10 L20 for the system's origin, G10 L10 for the tool's. G52 gives the G92 offset itself. G10
 takes coordinates as absolute, whatever G90 and G91 say. Fanuc's and Haas' G10 L20 P gives the origin of G54.1
-P; what would add after G91 is refused: the flat program (language/flat.py) could not say it.
+P; what would add after G91 is refused: the flat program (writer.py) could not say it.
 
 Axes beside x, y and z are joints without rotation of the work system and tool offsets.
 """

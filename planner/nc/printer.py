@@ -5,7 +5,7 @@
 A program is one if it says how E counts (M82, M83), sets a heater, fan, limit or flow to a number (M104 S200; M104
 and M109 alone are codes of mills), or has a command of Klipper: a name of two words or more, or with KEY=VALUE
 behind it. G codes that RS274NGC shares with printers are read as those of any program. Of the others, those that
-set limits and coordinates act (set_limits.py, saved_states.py), all else is an event: counted where it moves
+set limits and coordinates act (set_limits.py), all else is an event: counted where it moves
 nothing, and said first where it may move, for what it moves is not known.
 """
 
@@ -46,7 +46,7 @@ _FEED_STAYS = ("G0", "G1")  # ... whose F is modal, too
 _BAMBU = 1000  # G2811, G9111 and others from here on, too
 _STOPPING = {"M0": 0, "M1": 10, "M2": 20, "M30": 300}
 _HOMING = ("G28", "G161", "G162")
-# Commands that set coordinates, or keep them (saved_states.py).
+# Commands that set coordinates, or keep them (set_limits.py).
 SAVE, RESTORE = "SAVE_GCODE_STATE", "RESTORE_GCODE_STATE"
 OFFSET, PLACE = "SET_GCODE_OFFSET", "SET_KINEMATIC_POSITION"
 OF_STATE = frozenset((SAVE, RESTORE, OFFSET, PLACE, "G60", "G61"))
@@ -128,7 +128,7 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
     if words.letter[word] == ord("N") and word + 1 < words.first[row + 1]:
         word += 1
     found = command_of(words.row_text(row))
-    if found is None or (found.name in _REFUSED and not ignored.ignores(found.name)):
+    if found is None or (found.name in _REFUSED and found.name not in ignored.reading.ignore):
         return False
     name, values = found.name, found.values()
     code = -1 if found.extended or len(name) == 1 else int(name[1:].partition(".")[0])
@@ -139,7 +139,7 @@ def take(words: Words, row: int, block: Block, ignored: IgnoredWords) -> bool:
         block.settings.append(settings.Setting(name, given, word, slot))
     elif name[0] == "G" and code in _ANY and not given.get("h"):
         return False
-    elif ignored.ignores(name):
+    elif name in ignored.reading.ignore:
         ignored.count(settings.LEFT_OUT_BY_USER, name, block.line)
     elif name in _STOPPING:
         block.m["stopping"], block.at["stopping"] = _STOPPING[name], word

@@ -154,7 +154,7 @@ def execute(
         from planner.nc.language.expand import expand  # 8 ms, for programs that compute
 
         state.seconds_meant = state.centres_known = True
-        return interpreter, *expand(interpreter, text_alone(data), HEIDENHAIN, integers_of(machine), tee)
+        return interpreter, *expand(interpreter, text_alone(data), HEIDENHAIN, tee)
     if language != SIEMENS:
         data, leader = detect.without_leader(data, reading)
         if leader:
@@ -194,13 +194,12 @@ def execute(
     state.centres_known = siemens
     state.plane_known = not state.fanuc or dialect == LATHE
     state.seconds_meant = not automatic or siemens or state.fanuc
-    integers = integers_of(machine)
-    words = integers.applied(words)
+    words = integers_of(machine).applied(words)
     if dialect is not None:
         interpreter.ignored.refuse_extruder()
         from planner.nc.language.expand import expand
 
-        program, faults = expand(interpreter, words, dialect, integers, tee)
+        program, faults = expand(interpreter, words, dialect, tee)
         if mark and faults:
             why = f"{faults[0].message} (read as a Sinumerik's because of {mark}; --dialect says otherwise)"
             faults = [dataclasses.replace(faults[0], message=why), *faults[1:]]

@@ -1,4 +1,4 @@
-"""Speed factors and limits that programs of printers and of grbl set, and the machine that they leave.
+"""What commands of printers and settings of grbl set: speed factors, limits, coordinates and kept states.
 
     M220 S50            F of what follows counts half; B keeps the factor, R brings it back (Marlin); Klipper and RepRapFirmware too
     M201, M202 X Y Z E  accelerations of axes [units/s2]; M202 those of Repetier's travels
@@ -13,21 +13,34 @@ motion: of all that were in force on a move the lowest holds throughout, which k
 first where they change on the way. A limit of the acceleration along the path is one of every axis: on a
 diagonal the axes' own let the path have up to sqrt(3) of it, which is said too. Limits above the machine's
 change nothing.
+
+Commands of printers that set coordinates, keep the state of a program or bring it back.
+
+    SET_GCODE_OFFSET Z=0.1, Z_ADJUST=0.05    shifts what follows; with MOVE=1 the head goes along, at MOVE_SPEED [mm/s]
+    SET_KINEMATIC_POSITION X=0               what the place of the head is called
+    SAVE_GCODE_STATE NAME=a                  keeps G90 and G91, offsets, F, its factor (M220) and the place
+    RESTORE_GCODE_STATE NAME=a MOVE=1        brings them back; with MOVE=1 the head goes to the place, at MOVE_SPEED
+    G60 S0, G61 S0 X Y F                     keeps the place, goes back to it (Marlin), with the axes named, or all
+
+How E counts is kept and brought back in extruder.py, by the `marks` of these commands.
 """
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, ROTARY_AXES, Machine
 from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
-from planner.nc.program import MOVES, SetLimit
-from planner.nc.settings import CORNERS, GRBL, SMOOTHNESS, VELOCITY_LIMIT, Setting
+from planner.nc.printer import OFFSET, PLACE, RESTORE, SAVE
+from planner.nc.program import MOVES, Kind, SetLimit
+from planner.nc.settings import CORNERS, GRBL, PRINTER_FEED, SMOOTHNESS, VELOCITY_LIMIT, Setting
 from planner.nc.state import State
 
 SPEED_FACTOR, SPEEDS, ACCELERATIONS, ALONG_PATH = "M220", "M203", ("M201", "M202"), "M204"
@@ -38,6 +51,8 @@ EVERY_AXIS = "xyzabcuvw"
 _AXES = EVERY_AXIS + EXTRUDER
 _LIMITING = ("velocity", "accel")
 FEED = "feed"  # what VELOCITY bounds beside the axes
+_XYZ = "xyz"
+_Kept = tuple[State, FloatArray]  # what SAVE_GCODE_STATE and G60 keep, with the `shift` of SET_GCODE_OFFSET
 
 
 class LimitsInForce:
@@ -164,3 +179,74 @@ def limited(machine: Machine, limits: Sequence[SetLimit], *, above: bool = False
     if axes == dict(machine.axes) and (feed_max == machine.feed_max or above):
         return machine
     return machine.model_copy(update={"axes": axes, "feed_max": feed_max})
+
+
+class SavedStates:
+    """States by their names; `shift` (3,) is that of SET_GCODE_OFFSET [mm]."""
+
+    def __init__(self) -> None:
+        self.kept: dict[str, _Kept] = {}
+        self.shift = np.zeros(3)
+        self.marks: list[tuple[int, str, bool]] = []  # row, name, and whether the state is brought back
+
+    def take(self, setting: Setting, state: State, table: BlockTable, line: int) -> None:
+        """Execute a command. Raises WordFault for a state that was not kept."""
+        name, given = setting.name, setting.values
+        if name in (SAVE, "G60"):
+            kept = replace(state, position=state.position.copy(), g92=state.g92.copy())
+            self.kept[name[0] + setting.slot] = kept, self.shift.copy()
+            if name == SAVE:
+                self.marks.append((table.frame, setting.slot, False))
+        elif name in (RESTORE, "G61"):
+            back = self.kept.get({RESTORE: "S", "G61": "G"}[name] + setting.slot)
+            if back is None:
+                raise WordFault(setting.word, f"{name} of a state that was not kept before it")
+            self._restore(setting, back, state, table, line)
+        elif name == PLACE:
+            here = state.programmed()
+            for axis, letter in enumerate(_XYZ):
+                if letter in given:
+                    state.g92[axis] += here[axis] - given[letter]
+            state.apply_offsets()
+        elif name == OFFSET:
+            shift = self.shift.copy()
+            for axis, letter in enumerate(_XYZ):
+                shift[axis] = given.get(letter, shift[axis] + given.get(f"{letter}_adjust", 0.0))
+            by, self.shift = shift - self.shift, shift
+            state.g92[:3] += by
+            state.apply_offsets()
+            if given.get("move"):
+                target = state.position.copy()
+                target[:3] += by
+                _go(target, given.get("move_speed"), state, table, line)
+
+    def homed(self, axes: list[int], state: State) -> None:
+        """What G92 has set of axes ends where they are homed, as Klipper and Marlin have it."""
+        state.g92[axes] = self.shift[axes]
+        state.apply_offsets()
+
+    def _restore(self, setting: Setting, kept: _Kept, state: State, table: BlockTable, line: int) -> None:
+        given, (back, shift) = setting.values, kept
+        if setting.name == "G61":
+            speed = given["f"] * state.unit / SECONDS_PER_MINUTE if "f" in given else None
+            target = state.position.copy()
+            axes = [axis for axis, letter in enumerate(_XYZ) if letter in given] or [0, 1, 2]
+            target[axes] = back.position[axes]
+            _go(target, speed, state, table, line)
+            return
+        self.marks.append((table.frame, setting.slot, True))
+        state.absolute, self.shift = back.absolute, shift.copy()
+        state.g92[:] = back.g92
+        state.apply_offsets()
+        state.feed, state.feed_unit, state.feed_factor = back.feed, back.feed_unit, back.feed_factor
+        if given.get("move"):
+            _go(back.position, given.get("move_speed"), state, table, line)
+
+
+def _go(target: FloatArray, speed: float | None, state: State, table: BlockTable, line: int) -> None:
+    """A straight move at a speed [mm/s], or at F where None is given."""
+    before = state.feed
+    state.feed = speed or before or PRINTER_FEED
+    state.position[:] = target
+    table.add(Kind.LINE, line, state)
+    state.feed = before

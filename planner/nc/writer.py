@@ -9,22 +9,33 @@ minute; the next other one has G94 and its feed.
 Numbers are rounded down to `SIGNIFICANT` digits: each move takes up to 0.1 % longer than asked.
 
 What was read from something else (HPGL) is written out as RS274NGC in mm, which reads back as the same program:
-coordinates are rounded to `flat.DECIMALS`, a tenth of what the reader may be off.
+coordinates are rounded to `DECIMALS`, a tenth of what the reader may be off.
+
+The expanded program as text: the words of every executed line, in their order, as any control reads them.
+
+Resolved are parameters, expressions, loops, branches, subprograms and saved modes. Everything else stays as
+the program has it: moves, arcs, feeds, dwells, canned cycles, work offsets, tools, spindle, coolant. Line
+numbers and comments are left out. Numbers are rounded to `DECIMALS`.
 """
 
 import math
 import re
 from functools import cache
+from pathlib import PurePath
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.machine import Machine
+from planner.nc.faults import require_none
+from planner.nc.integers import LENGTHS, DwellWords
 from planner.nc.language.detect import without_leader
-from planner.nc.language.flat import flat_number, in_comment
 from planner.nc.lexer import NUMBER, Words, split_words
 from planner.nc.program import FEED_MOVES, Kind, PathControl, Program, extruder_alone, plain
+from planner.nc.reader import execute, interpret, rewritten
+from planner.nc.reading import CL, FANUC, KLIPPER, Reading
 
 SIGNIFICANT = 4  # digits of a feed
 FEED_MIN = 0.01  # the lowest feed that is written [mm/s]: no control moves slower, and F0 is an error
@@ -34,6 +45,11 @@ _F, _G = ord("F"), ord("G")
 _NUMBER = re.compile(NUMBER)
 STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
+DECIMALS = 7  # of a number
+_LEFT_OUT = frozenset(ord(letter) for letter in "N%O")
+_ENDS = ("M2", "M02", "M30")
+# Characters that must not stand in a comment, and what stands there instead.
+_NO_COMMENT = {ord(letter): "_" for letter in "()"} | dict.fromkeys(range(32), "_")
 Edit = tuple[int, int, bytes]  # bytes from ... to ... of the source become the text
 
 
@@ -239,3 +255,64 @@ def _arc(program: Program, row: int, position: FloatArray, end: FloatArray) -> s
     centre = program.arc_center[row] - position
     code = "G3" if program.arc_sweep[row] > 0 else "G2"
     return f"{code} {_xy(end)} I{flat_number(centre[0])} J{flat_number(centre[1])}"
+
+
+class _Flat:
+    """Collects the lines of a program while it is expanded. With `points` lengths and the times of dwells are
+    written with a point, because the machine reads them otherwise without."""
+
+    def __init__(self, source: str, points: bool):
+        self.points, self._dwells = points, DwellWords()
+        head = f"{in_comment(source)}, expanded by feedrate-planner: parameters, loops and calls written out"
+        self.lines = [f"({head})"]
+
+    def add(self, words: Words) -> None:
+        """Write the rows of a chunk as lines."""
+        letters, values, first = words.letter.tolist(), words.value.tolist(), words.first.tolist()
+        written = cache(flat_number)
+        dwells = set(self._dwells.find(words)) if self.points else set()
+        for row in range(len(first) - 1):
+            line = []
+            for w in range(first[row], first[row + 1]):
+                if letters[w] not in _LEFT_OUT:
+                    number = written(values[w])
+                    is_length = self.points and letters[w] in LENGTHS and "." not in number
+                    with_point = is_length or (w in dwells and values[w].is_integer())
+                    line.append(chr(letters[w]) + number + "." * with_point)
+            if line:
+                self.lines.append(" ".join(line))
+
+    def text(self) -> str:
+        """The program, with M2 at its end if it has no end of its own."""
+        ended = bool(set(self.lines[-1].split()) & set(_ENDS))
+        return "\n".join([*self.lines, *([] if ended else ["M2"]), ""])
+
+
+def in_comment(source: str) -> str:
+    """The name of a program as it may stand in a comment."""
+    return PurePath(source).name.translate(_NO_COMMENT)
+
+
+def flat_number(value: float) -> str:
+    """A number without exponent, rounded to `DECIMALS`."""
+    text = repr(round(float(value), DECIMALS) + 0.0)  # + 0.0 turns -0 into 0
+    return plain(float(text)) if "e" in text else text.removesuffix(".0")
+
+
+def flat_program(
+    data: bytes, machine: Machine | None, reading: Reading, *, source: str
+) -> tuple[str, Program] | None:
+    """The text of an expanded program and the program itself; None if it has nothing to expand. Raises
+    InputError for the first construct that is not supported or not valid."""
+    program, faults = interpret(data, machine, reading, source=source)
+    require_none(faults, source)
+    if program.expansion is None:
+        return None
+    if program.expansion.dialect in (KLIPPER, CL):
+        called = rewritten(data, machine, reading, source)
+        return ("" if called is None else called.data.decode("utf-8", "replace")), program
+    fanuc = program.expansion.dialect == FANUC
+    flat = _Flat(source, fanuc or (machine is not None and machine.dialect is not None))
+    # once more, now that it is known how arc centres are read
+    execute(data, machine, program.reading, source, flat.add)
+    return flat.text(), program

@@ -24,7 +24,7 @@ from planner.nc.points import own_text
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import AUTO
-from planner.nc.writer import SAME_FEED, program_text, retimed
+from planner.nc.writer import SAME_FEED, flat_program, program_text, retimed
 from planner.report.word_feed import ABOVE, PlannedBlocks, feeds_of, planned_blocks
 
 if TYPE_CHECKING:
@@ -143,8 +143,6 @@ def _written_anew(plan: Plan, feeds: FloatArray) -> bytes:
 def _expanded(data: bytes, plan: Plan, whole: Program, feeds: FloatArray, often: FloatArray | None) -> bytes:
     """The expanded program with its feeds, which reads back as the same path. Raises LeftOut if it does
     not."""
-    from planner.nc.language.flat import flat_program  # 10 ms, for programs that compute
-
     source = plan.program.source
     found = flat_program(data, plan.machine, plan.program.reading, source=source)
     assert found is not None

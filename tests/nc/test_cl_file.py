@@ -7,10 +7,10 @@ import pytest
 
 from planner.base.errors import InputError
 from planner.machine import Machine, load_machine, machine_from_dict
-from planner.nc.language.flat import flat_program
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import AS_USUAL, Reading
+from planner.nc.writer import flat_program
 
 PART = """$$ made by hand
 PARTNO/A PART OF 3 IPM

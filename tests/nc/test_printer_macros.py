@@ -12,11 +12,11 @@ from planner.base.errors import InputError
 from planner.controls.machine_import.convert import import_machine
 from planner.machine import Machine, load_machine, machine_from_dict
 from planner.nc import macros
-from planner.nc.language.flat import flat_program
 from planner.nc.macros import written_out
 from planner.nc.program import MOVES, Kind, Program
 from planner.nc.reader import interpret, parse_program
 from planner.nc.reading import AS_USUAL, Reading
+from planner.nc.writer import flat_program
 
 # Of Voron's configuration, and one for the end that asks the printer.
 CONFIG = """[printer]

@@ -23,11 +23,11 @@ from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.integers import integers_of
 from planner.nc.language.detect import without_leader
-from planner.nc.language.flat import flat_number
 from planner.nc.lexer import FAULT, Words, split_words
 from planner.nc.program import MOVES, Kind, Program
 from planner.nc.set_limits import SPEED_FACTOR
 from planner.nc.settings import AXES, EVERYTHING, TEXTS, setting
+from planner.nc.writer import flat_number
 
 LINEAR = "XYZ"
 # G codes in tenths.

@@ -17,7 +17,7 @@ from planner.nc.points import own_text
 from planner.nc.program import FEED_MOVES, Kind, Program, plain
 from planner.nc.reader import parse_program
 from planner.nc.reading import ABSOLUTE, AUTO, INCREMENTAL, LINUXCNC, Reading
-from planner.nc.writer import FEED_MIN, program_text, round_down
+from planner.nc.writer import FEED_MIN, flat_program, program_text, round_down
 from planner.planning.job.plan import Plan
 
 CURVE = "G6.2"  # of a curve without a text, which no control is given: chords stand for it
@@ -47,8 +47,6 @@ def source_of(plan: Plan) -> Source:
         return _read(program_text(program, feeds, 1.0).encode(), plan, "as an NC program")
     if program.expansion is None:
         return rows_of(text, _same(text, plan, program.reading, ""), plan.machine)
-    from planner.nc.language.flat import flat_program  # 10 ms, for programs that compute
-
     found = flat_program(text, plan.machine, program.reading, source=program.source)
     if found is None:
         raise InputError("the program has changed since it was planned", source=program.source)

@@ -6,6 +6,6 @@ words.
     source, detect                       which lines are plain words, which belong to a language
     expressions, compiled, run, rows     statements to Python source, the running program, the rows that it appends
     making, makers, milling              rows that Python makes while it runs
-    rows_through, travel, corner_moves, approach    frames, compensation and corners on the rows' way to the interpreter
-    expand, flat                         a program through all of this; the expanded program as text
+    rows_through, travel, corner_moves   frames, compensation and corners on the rows' way to the interpreter
+    expand                               a program through all of this; ../writer.py has it as text
 """

@@ -8,7 +8,6 @@ so that an error of Python's arithmetic is told as the statement's.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from types import TracebackType
 
 from planner.base.sizes import SIZES
@@ -38,34 +37,26 @@ def turns_of(value: float | None) -> int:
     return math.floor((value or 0.0) + 0.5)
 
 
-@dataclass
-class Compiled:
-    """Python functions of procedures, by name, and the place of each line of their source."""
-
-    functions: dict[str, Callable[..., float | None]] = field(default_factory=dict)
-    places: list[tree.SourcePlace] = field(default_factory=list)
+Functions = dict[str, Callable[..., float | None]]  # of procedures, by name
+Places = list[tree.SourcePlace]  # of the lines of their Python source
 
 
 def compile_procedures(
     procedures: Sequence[tree.Procedure], language: tree.Language, rows: AppendedRows, marker: str
-) -> Compiled:
+) -> tuple[Functions, Places]:
     """Compile procedures; the rows that they append are added to `rows`. Raises ProgramFault for a jump that
     leads nowhere.
 
     marker : stands for a file name in tracebacks
     """
-    found = Compiled()
-    text: list[str] = []
     makers: list[Callable[..., object]] = []
+    lines: list[tuple[str, tree.SourcePlace]] = []
     for k, procedure in enumerate(procedures):
-        lines = _Function(language, rows, makers).source(procedure, f"p{k}")
-        text += [line for line, _ in lines]
-        found.places += [place for _, place in lines]
+        lines += _Function(language, rows, makers).source(procedure, f"p{k}")
     namespace: dict[str, object] = {"whole": whole, "turns_of": turns_of, "M": makers, **FUNCTIONS}
-    exec(compile("\n".join(text), marker, "exec"), namespace)
-    for k, procedure in enumerate(procedures):
-        found.functions[procedure.name] = namespace[f"p{k}"]  # type: ignore[assignment]
-    return found
+    exec(compile("\n".join(line for line, _ in lines), marker, "exec"), namespace)
+    functions = {procedure.name: namespace[f"p{k}"] for k, procedure in enumerate(procedures)}
+    return functions, [place for _, place in lines]  # type: ignore[return-value]
 
 
 class _Function:
@@ -244,22 +235,22 @@ class _Function:
         self.makers.append(made.maker)
 
 
-def statement_of(traceback: TracebackType | None, units: Mapping[str, Compiled]) -> tree.SourcePlace:
-    """The statement that a traceback ends in; `units` are the compiled procedures by their marker."""
+def statement_of(traceback: TracebackType | None, units: Mapping[str, Places]) -> tree.SourcePlace:
+    """The statement that a traceback ends in; `units` are compiled files by their marker."""
     place = None
     while traceback is not None:
         unit = units.get(traceback.tb_frame.f_code.co_filename)
         if unit is not None:
-            place = unit.places[traceback.tb_lineno - 1]
+            place = unit[traceback.tb_lineno - 1]
         traceback = traceback.tb_next
     assert place is not None
     return place
 
 
-def last_statement(units: Mapping[str, Compiled]) -> tree.SourcePlace:
+def last_statement(units: Mapping[str, Places]) -> tree.SourcePlace:
     """The last statement of the main program, the first of the units."""
     main = next(iter(units.values()))
-    return max((place for place in main.places if place.file == 0), key=lambda place: place.at)
+    return max((place for place in main if place.file == 0), key=lambda place: place.at)
 
 
 def endless(what: str) -> ValueError:

@@ -20,7 +20,7 @@ from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, at_place, in_plane
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter, CutterFault, OffsetMove, dot, meeting
-from planner.nc.language.travel_rows import AXES, STANDS, STOPS, G, M, Move, TravelRow, arc_words
+from planner.nc.language.rows import AXES, STANDS, STOPS, G, M, Move, TravelRow, arc_words, require
 from planner.nc.program import Kind
 from planner.nc.state import State
 
@@ -169,8 +169,7 @@ class CornerMove:
         out = rises or first.stands(normal) or second.stands(normal)
         if self.modal and (out or 0 in (first.code, second.code)):
             return [first], second
-        if out:
-            raise ValueError("a rounding or chamfer stands between two moves in the plane")
+        require(not out, "a rounding or chamfer stands between two moves in the plane")
         corner, before, after = in_plane(first.end, normal), first.leaving(normal), second.tangent(normal)
         turn = cmath.phase(after / before)
         if abs(turn) < _STRAIGHT_ON or self.size == 0.0:
@@ -187,8 +186,7 @@ class CornerMove:
             raise ValueError(_TOO_LARGE)
         start, end = _foot(first, centre, normal), _foot(second, centre, normal)
         sweep = cmath.phase((end - centre) / (start - centre))
-        if sweep * side <= 0.0:
-            raise ValueError(_TOO_LARGE)
+        require(sweep * side > 0.0, _TOO_LARGE)
         arc = Arc(at_place(centre, first.end, normal), sweep)
         return self._parts(second, start, end, arc, normal)
 
@@ -211,8 +209,7 @@ def _beside(move: Move, distance: float, normal: int) -> OffsetMove:
         return OffsetMove(end + 1j * distance * last, first, last)
     turning, centre = (1 if move.arc.sweep > 0 else -1), in_plane(move.arc.centre, normal)
     radius = abs(end - centre) - turning * distance
-    if radius <= 0.0:
-        raise ValueError(_TOO_LARGE)
+    require(radius > 0.0, _TOO_LARGE)
     return OffsetMove(end + 1j * distance * last, first, last, turning, centre, radius)
 
 
@@ -231,13 +228,11 @@ def _cut(move: Move, begin: FloatArray, end: FloatArray, normal: int) -> Move:
     axes = sorted({*move.axes, *IN_PLANE[normal]})
     start, stop = in_plane(begin, normal), in_plane(end, normal)
     if move.arc is None:
-        if dot(stop - start, move.tangent(normal)) < -STANDS:
-            raise ValueError(_TOO_LARGE)
+        require(dot(stop - start, move.tangent(normal)) >= -STANDS, _TOO_LARGE)
         return replace(move, begin=begin, end=end, axes=axes)
     centre, sweep = in_plane(move.arc.centre, normal), move.arc.sweep
     left_out = abs(cmath.phase((start - centre) / (in_plane(move.begin, normal) - centre)))
     left_out += abs(cmath.phase((in_plane(move.end, normal) - centre) / (stop - centre)))
-    if left_out >= abs(sweep):
-        raise ValueError(_TOO_LARGE)
+    require(left_out < abs(sweep), _TOO_LARGE)
     rest = math.copysign(abs(sweep) - left_out, sweep)
     return replace(move, begin=begin, end=end, axes=axes, arc=Arc(move.arc.centre, rest))

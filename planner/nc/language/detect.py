@@ -44,7 +44,7 @@ _OF_ANOTHER = re.compile(
     r"[^(;]*?#|\s*(?:N\w+\s+)?(?:CALL\s+O\d|(?:MODIN|MODOUT|NOEX|NLAP|RTS)\b)", re.IGNORECASE
 )
 _SIEMENS_CODES = (331, 332, 500, *range(505, 600), 601, 602, 603, 621, *range(641, 646), 700, 710)
-_PROGRAM_HEAD = re.compile(rb"^%_N_(\w+)_(MPF|SPF)\b", re.MULTILINE)
+_PROGRAM_HEAD = re.compile(rb"^(%_N_(\w+)_(MPF|SPF)\b)", re.MULTILINE)
 _OF_CYCLES = frozenset(b"PQUWRIJKL")  # letters of a line in which G70 and G71 are cycles
 _SUBPROGRAMS = (".mpf", ".spf")
 # A plotter file starts with one of these instructions and a number, the end of the instruction or the next
@@ -107,14 +107,11 @@ class Archived(NamedTuple):
 
 def programs_of(data: bytes) -> dict[str, Archived]:
     """The programs of a Sinumerik's archive by the names of their files, in small letters; {} for a file of one program."""
-    heads = list(_PROGRAM_HEAD.finditer(data)) if data.count(b"%_N_") > 1 else []
-    ends = [*(head.start() for head in heads[1:]), len(data)]
-    found, lines, before = dict[str, Archived](), 0, 0
-    for head, end in zip(heads, ends, strict=True) if heads else ():
-        lines += data.count(b"\n", before, head.start())
-        before = head.start()
-        name = f"{head[1].decode()}.{head[2].decode()}".lower()
-        found[name] = Archived(lines, b" " * len(head[0]) + data[head.end() : end])
+    before, *programs = _PROGRAM_HEAD.split(data) if data.count(b"%_N_") > 1 else (b"",)
+    found, lines = dict[str, Archived](), before.count(b"\n")
+    for head, name, kind, body in zip(*(programs[k::4] for k in range(4)), strict=True):
+        found[f"{name.decode()}.{kind.decode()}".lower()] = Archived(lines, b" " * len(head) + body)
+        lines += body.count(b"\n")
     return found
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from planner.nc.faults import Fault
-from planner.nc.integers import Integers
+from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.compiled import compile_procedures
 from planner.nc.language.fanuc import lathe
@@ -34,20 +34,19 @@ Tee = Callable[[Words], None]
 
 
 def expand(
-    interpreter: Interpreter, words: Words, dialect: str, integers: Integers, tee: Tee | None = None
+    interpreter: Interpreter, words: Words, dialect: str, tee: Tee | None = None
 ) -> tuple[Program, Sequence[Fault]]:
     """Run a program of that dialect through the interpreter; returns it and its faults, those of its
     statements first.
 
-    words    : of the whole program; rows that compute are read again as text
-    integers : what numbers without a point mean, applied to the words already
+    words : of the whole program, numbers without a point in units; rows that compute are read again as text
 
     Nothing is run if a line cannot be read; otherwise the program is run to its end, or to what stops it.
     """
     rows = AppendedRows()
     run = ProgramRun(interpreter, rows, DIALECTS[dialect])
     run.tee = tee or run.tee
-    files = _Files(run, rows, DIALECTS[dialect], integers)
+    files = _Files(run, rows, DIALECTS[dialect])
     found = files.read(words, interpreter.source)
     if not found:
         stopped = run.start()
@@ -72,20 +71,15 @@ DIALECTS: dict[str, Dialect] = {
 class _Files:
     """The files of a program: its own, and those in its folder that it calls."""
 
-    def __init__(self, run: ProgramRun, rows: AppendedRows, dialect: Dialect, integers: Integers):
-        self.run, self.rows, self.dialect, self.integers = run, rows, dialect, integers
+    def __init__(self, run: ProgramRun, rows: AppendedRows, dialect: Dialect):
+        self.run, self.rows, self.dialect = run, rows, dialect
         self.sources: list[Source] = []
         run.load = self.load
 
     def read(self, words: Words, name: str) -> list[ProgramFault]:
         """Compile a file; returns what cannot be read in it."""
         first, begin = self.rows.add_file(words, name)
-        source = Source(words, len(self.sources), first, begin, self.integers)
-        interpreter = self.run.interpreter
-        source.at_tip, source.skips = interpreter.ignored.at_tip, interpreter.reading.block_delete
-        if interpreter.machine is not None and interpreter.machine.dialect is not None:
-            source.harmless = frozenset(map(str.upper, interpreter.machine.dialect.subprograms))
-        source.harmless |= frozenset(interpreter.reading.ignore)
+        source = Source(words, len(self.sources), first, begin, self.run.interpreter)
         self.sources.append(source)
         if source.file:
             self.run.files.append(name)
@@ -96,9 +90,11 @@ class _Files:
             if parser.faults:
                 return sorted(parser.faults, key=lambda fault: fault.place.line)
             try:
-                self.run.add(compile_procedures(procedures, self.dialect.language, self.rows, marker), marker)
+                functions, places = compile_procedures(procedures, self.dialect.language, self.rows, marker)
             except ProgramFault as fault:
                 return [fault]
+        self.run.units[marker] = places
+        self.run.functions = functions | self.run.functions
         return []
 
     def load(self, name: str) -> bool:
@@ -113,7 +109,7 @@ class _Files:
         if data is None:
             return False
         words = split_words(data, block_delete=self.run.interpreter.reading.block_delete)
-        faults = self.read(self.integers.applied(words), str(path or program))
+        faults = self.read(integers_of(self.run.interpreter.machine).applied(words), str(path or program))
         if faults:
             raise faults[0]
         nameless = self.run.functions.pop("file", None)  # a subprogram that only its file names

@@ -192,10 +192,11 @@ class Expressions:
             else:
                 text = f"R({self.value(index)})"
             return (text if raw else language.read.format(text)), False
-        if isinstance(expression, tree.Exists):
-            parameter = expression.parameter
+        if expression.name == "EXISTS":
+            (parameter,) = expression.operands
             if isinstance(parameter, tree.Numbered):
                 return f"run.exists({self.value(parameter.index)})", True
+            assert isinstance(parameter, tree.Named)
             if parameter.shared and parameter.name in language.system_names:
                 return "True", True
             return f"({parameter.name!r} in {'G' if parameter.shared else 'L'})", True

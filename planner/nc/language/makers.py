@@ -10,7 +10,7 @@ their order, which is not documented, is refused. A shift alone becomes a G52; e
 the coordinates of the work system (`travel`).
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from functools import partial
 
 import numpy as np
@@ -19,10 +19,9 @@ from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.approach import ContourWay
-from planner.nc.language.making import TAPPED, Maker, Making, Row, around
-from planner.nc.language.travel import FRAME_CHANGES
-from planner.nc.language.travel_rows import STANDS, TravelRow, turned
+from planner.nc.language.making import TAPPED, Given, Maker, Making, Row, around
+from planner.nc.language.rows import STANDS, TravelRow, require, turned
+from planner.nc.language.travel import FRAME_CHANGES, ContourWay
 from planner.nc.language.tree import Expression, MadeRows, SourcePlace, made
 from planner.nc.program import Kind
 
@@ -31,7 +30,6 @@ FRAMES = ("TRANS", "ROT", "SCALE", "MIRROR")  # of Siemens, with A before them w
 _G63 = 63.0
 _FLAT = 1e-9  # relative, below which three points are on a line
 _F = ord("F")
-Given = Mapping[str, float]
 
 
 def siemens_frame(making: Making, given: Given, *, name: str) -> Iterator[Row]:
@@ -48,8 +46,7 @@ def siemens_frame(making: Making, given: Given, *, name: str) -> Iterator[Row]:
         elif kind == "ROT":
             step = step @ turned(given[letter], axis)
         elif kind == "SCALE":
-            if given[letter] == 0.0:
-                raise ValueError("a scale of 0 makes a point of everything")
+            require(given[letter] != 0.0, "a scale of 0 makes a point of everything")
             step[axis, axis] = given[letter]
         else:
             step[axis, axis] = -1.0
@@ -96,8 +93,7 @@ def heidenhain_frame(making: Making, given: Given, *, cycle: int) -> Iterator[Ro
 def _in_force(making: Making) -> Iterator[Row]:
     """The programmed frame holds from here on; G52 where it is a shift alone. Raises ValueError."""
     matrix, shift = making.travel.programmed
-    if making.travel.compensated:
-        raise ValueError(FRAME_CHANGES)
+    require(not making.travel.compensated, FRAME_CHANGES)
     if not making.travel.tilted:
         values = shift / making.unit if (matrix == np.eye(3)).all() else np.zeros(3)
         yield [("G", 52.0), *zip(AXES, values.tolist(), strict=True)]
@@ -129,8 +125,7 @@ def approach(making: Making, given: Given, *, kind: str, side: int) -> None:
 def depart(making: Making, given: Given, *, kind: str) -> None:
     """DEP of a kind, with X Y Z, LEN, R, CCA and F."""
     way = _way(making, given, "DEP", kind)
-    if kind == "LCT" and not {"X", "Y"} & set(given):
-        raise ValueError("DEP LCT needs its end as X and Y")
+    require(kind != "LCT" or {"X", "Y"} & set(given), "DEP LCT needs its end as X and Y")
     making.travel.depart(way, _target(making, given), raised="Z" in given)
 
 
@@ -148,8 +143,7 @@ def corner(place: SourcePlace, kind: str, size: Expression, *, modal: bool = Fal
 
 
 def _corner(making: Making, given: Given, *, kind: str, modal: bool) -> None:
-    if given["size"] < 0.0:
-        raise ValueError("a rounding or chamfer is not negative")
+    require(given["size"] >= 0.0, "a rounding or chamfer is not negative")
     making.travel.corner(kind, given["size"] * making.unit, making.place.line, modal=modal)
 
 
@@ -233,8 +227,7 @@ def arc_through(making: Making, given: Given) -> Iterable[Row]:
 def dwell_turns(making: Making, given: Given) -> list[Row]:
     """A dwell of so many turns of the spindle. Raises ValueError where it stands."""
     speed = making.interpreter.state.spindle.speed
-    if not speed > 0.0:
-        raise ValueError("G4 S, a dwell in turns of the spindle, needs the spindle's speed S before it")
+    require(speed > 0.0, "G4 S, a dwell in turns of the spindle, needs the spindle's speed S before it")
     return [[("G", 4.0), ("P", given["turns"] / speed * SECONDS_PER_MINUTE)]]
 
 
@@ -245,8 +238,7 @@ def tap_path(making: Making, given: Given, *, code: float) -> Iterator[Row]:
     feed = given.get("F", state.feed * SECONDS_PER_MINUTE / making.unit)
     if code != _G63:
         feed = abs(given["lead"]) * speed
-    if not feed > 0.0:
-        raise ValueError("tapping by G331 needs the lead (K) and the speed S, G63 its F")
+    require(feed > 0.0, "tapping by G331 needs the lead (K) and the speed S, G63 its F")
     making.assume(TAPPED)
     ends = [(axis, given[axis]) for axis in AXES if axis in given]
     stop: Row = [("G", 4.0), ("P", 0.0)]

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
+from planner.nc.language.rows import TravelRow, require
 from planner.nc.language.travel import Travel
-from planner.nc.language.travel_rows import TravelRow
 from planner.nc.language.tree import MadeRows, SourcePlace, made
 
 ASSUMED = {
@@ -33,8 +33,9 @@ ASSUMED = {
 }
 TAPPED = "tapping is planned with lead times speed as its upper limit and full stops, not at constant feed"
 Row = list[tuple[str, float]]
-Cycle = Callable[["Making", Mapping[str, float]], Iterable[Row]]
-Maker = Callable[["Making", Mapping[str, float]], Iterable[Row] | None]
+Given = Mapping[str, float]  # values of a command by name
+Cycle = Callable[["Making", Given], Iterable[Row]]
+Maker = Callable[["Making", Given], Iterable[Row] | None]
 ROWS_MAX = 200_000  # of one cycle: an infeed that small is a mistake
 _ROUNDING = 1e-9  # of a number of steps
 _COARSE = {
@@ -71,10 +72,8 @@ class Making:
         """Rows to execute, all of them at the end, or where their maker asks for it by `flush`."""
         for row in rows or ():
             for letter, value in row:
-                if not math.isfinite(value):
-                    raise ValueError(
-                        f"the computed {letter} word is {'infinite' if math.isinf(value) else 'no number'}"
-                    )
+                wrong = "infinite" if math.isinf(value) else "no number"
+                require(math.isfinite(value), f"the computed {letter} word is {wrong}")
             words = [(ord(letter), value, self.place.at) for letter, value in row]
             self._rows.append(TravelRow(words, self.place.line, self.frame))
         self.flush()
@@ -103,15 +102,13 @@ class Making:
     def tool_radius(self) -> float:
         """Radius of the loaded tool in the program's unit. Raises ValueError where it is not known."""
         found = self.travel.radius()
-        if found == 0.0:
-            tool = f"the diameter of tool {self.interpreter.state.tool_loaded}"
-            raise ValueError(f"the cycle needs {tool}; write it into [tools] of the machine file")
+        tool = f"the diameter of tool {self.interpreter.state.tool_loaded}"
+        require(found != 0.0, f"the cycle needs {tool}; write it into [tools] of the machine file")
         return found / self.unit
 
     def assume(self, text: str) -> None:
         """Keep an assumption that may change geometry or time. Raises ValueError in strict reading."""
-        if self.interpreter.findings.strict:
-            raise ValueError(f"{text} (assumed without --strict)")
+        require(not self.interpreter.findings.strict, f"{text} (assumed without --strict)")
         self.interpreter.findings.assume(text, self.place.line)
 
 
@@ -157,8 +154,7 @@ class HolePlan:
     what: str = "hole"  # for messages
 
     def __post_init__(self) -> None:
-        if self.bottom >= self.top:
-            raise ValueError(f"the bottom of the {self.what} lies at or above its surface")
+        require(self.bottom < self.top, f"the bottom of the {self.what} lies at or above its surface")
 
 
 def coarse_lead(size: float, unit: float) -> float:
@@ -214,8 +210,7 @@ def tapped(
     up    : where the way out ends, else at the clearance
     start : the tool goes to the clearance first
     """
-    if not (speed > 0.0 and lead != 0.0):
-        raise ValueError("tapping needs the lead of the thread and the speed of the spindle")
+    require(speed > 0.0 and lead != 0.0, "tapping needs the lead of the thread and the speed of the spindle")
     size = abs(lead)
     making.assume(TAPPED)
     first, second = (3.0, 4.0) if lead > 0.0 else (4.0, 3.0)
@@ -255,8 +250,7 @@ class Pecks:
         """Where the infeeds end, down to a depth. Raises ValueError for infeeds that never reach it."""
         step = self.infeed if self.infeed > 0.0 else depth
         least = self.least if self.less > 0.0 else step
-        if least <= 0.0:
-            raise ValueError("the least of decreasing infeeds is to be above 0")
+        require(least > 0.0, "the least of decreasing infeeds is to be above 0")
         equal_steps(depth, least)
         found: list[float] = []
         while not found or found[-1] < depth:
@@ -308,11 +302,9 @@ def milled(making: Making, hole: HolePlan, diameter: float, infeed: float, turni
     """A bore on a helix: infeed per turn, once round on the ground, to the middle. Raises ValueError."""
     radius = making.tool_radius()
     size = diameter / 2.0 - radius
-    if size <= 0.0:
-        raise ValueError("the bore is to be wider than the tool")
-    if size > radius:
-        core = f"leaves a core where the tool has a radius of {radius:.6g} only; use a pocket"
-        raise ValueError(f"a helix of radius {size:.6g} {core}")
+    require(size > 0.0, "the bore is to be wider than the tool")
+    core = f"leaves a core where the tool has a radius of {radius:.6g} only; use a pocket"
+    require(size <= radius, f"a helix of radius {size:.6g} {core}")
     (x, y, _), feed = making.here(), hole.feed or 0.0
     yield go(hole.clear)
     yield [("G", 1.0), ("F", feed), ("X", x + size), ("Y", y)]

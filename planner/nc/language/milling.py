@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from planner.nc.language.making import HolePlan, Row, equal_steps, helix
+from planner.nc.language.rows import require
 from planner.nc.turning import Leg
 
 _SHORT = 1e-9  # relative length of a leg that is left out
@@ -133,9 +134,8 @@ def loops(shape: PocketShape, outermost: float, step: float, turning: int) -> li
     step      : most between two paths
     """
     width = shape.room - outermost
-    if width < -_SHORT * shape.room:
-        room = f"the pocket leaves room for a tool of radius {shape.room:.6g} mm less its allowance"
-        raise ValueError(f"{room}; the tool is larger")
+    room = f"the pocket leaves room for a tool of radius {shape.room:.6g} mm less its allowance"
+    require(width >= -_SHORT * shape.room, f"{room}; the tool is larger")
     if width <= _SHORT * shape.room:
         return [shape.core()]
     count = max(1, math.ceil(width / step - _SHORT))

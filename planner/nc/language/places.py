@@ -12,7 +12,7 @@ from planner.base.arrays import FloatArray
 from planner.nc import codes
 from planner.nc.arcs import IN_PLANE, Arc, ArcWay, arc_from_centre, arc_from_radius, at_place, in_plane
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.travel_rows import (
+from planner.nc.language.rows import (
     AXES,
     CENTRES,
     RADIUS,
@@ -21,6 +21,7 @@ from planner.nc.language.travel_rows import (
     FrameParts,
     G,
     TravelRow,
+    require,
     tilted_rows,
     turned,
 )
@@ -90,10 +91,8 @@ class Places:
         inner = self.matrix[np.ix_(plane, plane)]
         size = abs(self._plane_size)
         off = max(abs(inner.T @ inner - size * np.eye(2)).max(), abs(self.matrix[normal, plane]).max())
-        if max(off, abs(self.matrix[plane, normal]).max()) > _EVEN * max(size, 1.0):
-            raise ValueError(
-                "an arc whose plane the frame scales unevenly, or turns out of itself, is no arc"
-            )
+        even = max(off, abs(self.matrix[plane, normal]).max()) <= _EVEN * max(size, 1.0)
+        require(even, "an arc whose plane the frame scales unevenly, or turns out of itself, is no arc")
 
     def arc(
         self, start: FloatArray, end: FloatArray, given: Mapping[int, float], clockwise: bool, unit: float
@@ -104,8 +103,7 @@ class Places:
         given      : lengths and turns by letter code
         """
         self.check_even()
-        if RADIUS not in given and not set(CENTRES) & set(given):
-            raise ValueError("an arc needs a centre or a radius")
+        require(RADIUS in given or set(CENTRES) & set(given), "an arc needs a centre or a radius")
         way = ArcWay(self.normal, clockwise, round(given.get(TURNS, 1.0)), unit)
         if RADIUS in given:
             arc = arc_from_radius(start, end, given[RADIUS], way)
@@ -142,10 +140,8 @@ class Places:
         G91 is about where the tool is. Raises ValueError."""
         first, second = (AXES[axis] for axis in IN_PLANE[self.normal])
         here, steps = in_plane(self.place, self.normal), first in given and not self.absolute
-        if second in given and first not in given and self._stepped:
-            raise ValueError(
-                "an angle alone behind a radius after G91 has no known centre; write the radius, too"
-            )
+        text = "an angle alone behind a radius after G91 has no known centre; write the radius, too"
+        require(second not in given or first in given or not self._stepped, text)
         if abs(here - pole) > STANDS and not self._stepped:
             self._angle = math.degrees(cmath.phase(here - pole))
         place, radius, angle = (here if steps else pole), abs(here - pole), self._angle

@@ -10,30 +10,30 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from planner.nc.arcs import IN_PLANE
+from planner.nc.arcs import IN_PLANE, PLANES
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.corner_moves import CornerMove, OffsetMoves
 from planner.nc.language.places import CYCLES, Places
-from planner.nc.language.travel_rows import (
+from planner.nc.language.rows import (
     AXES,
     CENTRES,
     RADIUS,
     ROTARY,
     TURNS,
+    AppendedRows,
     G,
     M,
     Move,
     TravelRow,
+    require,
     rows_from,
     travel_rows_of,
-    words_of,
 )
 from planner.nc.language.tree import ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
 
-# G codes of planes with their normals, and M codes that end the program.
-_PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
+# M codes that end the program.
 _ENDS = (2.0, 30.0)
 _SWITCHES = (*TOOL_POINT_ON, *TOOL_POINT_OFF)  # M codes behind which x, y, z are others
 # G codes behind which the position is asked of the interpreter.
@@ -53,8 +53,9 @@ class RowsThrough(Places):
     lost   : an approach or departure came behind it: its direction is not that of the path
     """
 
-    def __init__(self, interpreter: Interpreter):
+    def __init__(self, interpreter: Interpreter, rows: AppendedRows):
         super().__init__(interpreter)
+        self.rows = rows
         self.active = False
         self.moves = 0
         self._mapped = np.zeros(3)  # `place` in the work system
@@ -78,7 +79,6 @@ class RowsThrough(Places):
 
     def through(self, words: Words) -> Iterator[Words]:
         """The rows to execute instead, in pieces that are executed one by one. Raises ProgramFault."""
-        self._files = words.files
         if not self.active:
             yield words
             return
@@ -88,7 +88,7 @@ class RowsThrough(Places):
                 rest = rows_from(words, row)
                 out += self._restored(rest)
                 if out:
-                    yield self._words(out, words)
+                    yield self._words(out)
                 self.active = self.lost = False
                 yield rest
                 return
@@ -98,11 +98,11 @@ class RowsThrough(Places):
                 except ValueError as fault:
                     raise self._fault(one, str(fault)) from fault
                 if foreign:
-                    yield self._words(out, words)
+                    yield self._words(out)
                     out = []
                     self._look()
         if out:
-            yield self._words(out, words)
+            yield self._words(out)
 
     def end(self) -> list[TravelRow]:
         """Rows left to execute when the program has ended without M2 or M30. Raises ValueError."""
@@ -113,8 +113,8 @@ class RowsThrough(Places):
             self._leave()
         return self._through_tilt(self._taken())
 
-    def _words(self, rows: list[TravelRow], words: Words) -> Words:
-        return words_of(self._through_tilt(rows), words.data, words.files)
+    def _words(self, rows: list[TravelRow]) -> Words:
+        return self.rows.words_of(self._through_tilt(rows))
 
     def _taken(self) -> list[TravelRow]:
         out, self._ahead = self._ahead, []
@@ -122,7 +122,9 @@ class RowsThrough(Places):
 
     def _fault(self, row: TravelRow, message: str) -> ProgramFault:
         at = row.words[0][2] if row.words else 0
-        return ProgramFault(SourcePlace(sum(begin <= at for begin, _ in self._files), row.line, at), message)
+        return ProgramFault(
+            SourcePlace(sum(begin <= at for begin, _ in self.rows.files), row.line, at), message
+        )
 
     def _take(self, row: TravelRow, out: list[TravelRow]) -> bool:
         """Take a row; True if the position is to be asked of the interpreter behind it."""
@@ -134,12 +136,11 @@ class RowsThrough(Places):
             self.motion, self._level = int(code), None
         if 80.0 in others:
             self._level = None
-        for code in others & _PLANES.keys():
-            if _PLANES[code] != self.normal:
-                if self.compensated:
-                    raise ValueError("the plane changes while cutter radius compensation is on")
+        for code in others & PLANES.keys():
+            if PLANES[code] != self.normal:
+                require(not self.compensated, "the plane changes while cutter radius compensation is on")
                 self._no_corner(out)
-            self.normal = _PLANES[code]
+            self.normal = PLANES[code]
         if others & {20.0, 21.0} and (20.0 in others) != (self._unit != 1.0):
             raise ValueError("the unit changes while a frame or compensation is in force")
         moved = {letter for letter, _, _ in row.words} & {*AXES, *CENTRES}
@@ -151,7 +152,7 @@ class RowsThrough(Places):
             self._no_corner(out)
             self._hole(TravelRow(words, row.line, row.frame), others & CYCLES, out)
             return True
-        foreign = others - _NEUTRAL - _PLANES.keys() - {20.0, 21.0}
+        foreign = others - _NEUTRAL - PLANES.keys() - {20.0, 21.0}
         ends = any(letter == M and value in _ENDS for letter, value, _ in row.words)
         changes = any(letter == M and value == 6.0 for letter, value, _ in row.words)
         if foreign or changes:
@@ -198,9 +199,8 @@ class RowsThrough(Places):
         out.append(row)
 
     def _move(self, row: TravelRow, out: list[TravelRow]) -> None:
-        if self.motion < 0:
-            text = "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it"
-            raise ValueError(text)
+        text = "an axis word while no motion code is in force; write G0, G1, G2 or G3 before it"
+        require(self.motion >= 0, text)
         given = self._lengths(row.words)
         target = self._target(given)
         mapped, arc = self.mapped(target), None
@@ -248,9 +248,8 @@ class RowsThrough(Places):
         waits = self._corner or self._coming
         if waits is None:
             return
-        if not waits.modal:
-            what = f"the rounding or chamfer of line {waits.line}"
-            raise ValueError(f"{what} needs a move in the plane before and behind")
+        what = f"the rounding or chamfer of line {waits.line}"
+        require(waits.modal, f"{what} needs a move in the plane before and behind")
         first, self._corner, self._coming = waits.first, None, None
         waiting, self._between = self._between, []
         rows: list[TravelRow] = []
@@ -268,8 +267,7 @@ class RowsThrough(Places):
         self.last = None
         self.motion = max(state.motion, -1 if state.fanuc else 0) if state.motion <= 3 else 0
         self._level = None if state.series is None else state.series.level * state.unit
-        if state.absolute_centre:
-            raise ValueError("frames and compensation with absolute arc centres are not read")
+        require(not state.absolute_centre, "frames and compensation with absolute arc centres are not read")
         self._look()
         if not state.absolute:
             self._ahead.append(TravelRow([(G, 90.0, 0)], 1, 0))

@@ -16,13 +16,20 @@ from typing import Any
 
 from planner.base.sizes import SIZES
 from planner.nc.interpreter import Interpreter
-from planner.nc.language.compiled import Compiled, endless, last_statement, sentence, statement_of, whole
+from planner.nc.language.compiled import (
+    Functions,
+    Places,
+    endless,
+    last_statement,
+    sentence,
+    statement_of,
+    whole,
+)
 from planner.nc.language.making import Maker, Making
-from planner.nc.language.rows import AppendedRows
+from planner.nc.language.rows import AppendedRows, TravelRow
 from planner.nc.language.source import Source
 from planner.nc.language.system_variables import Modes, SystemVariables
 from planner.nc.language.travel import Travel
-from planner.nc.language.travel_rows import TravelRow, words_of
 from planner.nc.language.tree import Language, ProgramFault, SourcePlace
 from planner.nc.lexer import Words
 from planner.nc.program import Frame
@@ -72,8 +79,8 @@ class ProgramRun:
         self.shared: dict[str, float] = {}  # values of the named parameters that all calls share
         self.turns = 0
         self.resume: float | None = None  # the label where the caller of a procedure goes on, or None
-        self.units: dict[str, Compiled] = {}  # by the marker of their source
-        self.functions: dict[str, Callable[..., float | None]] = {}
+        self.units: dict[str, Places] = {}  # compiled files, by the marker of their source
+        self.functions: Functions = {}
         self.frames = [Frame(name="", source=interpreter.source, line=0, caller=-1)]
         self.files = [interpreter.source]
         self.load: Load = lambda name: False
@@ -84,11 +91,11 @@ class ProgramRun:
         self._frame = 0
         self._depth = 0
         self._known_frames: dict[tuple[int, int, int, str], int] = {}
-        self._saved: list[Modes | None] = [None]
-        self._restored_at_return: list[bool] = [False]
+        # of each open call: the modes that it has saved, and whether they are restored at its end
+        self._saved: list[tuple[Modes | None, bool]] = [(None, False)]
         self._messages = 0
         self._at_once = IDLE_AT_ONCE
-        self.travel = Travel(interpreter)
+        self.travel = Travel(interpreter, rows)
         self.system.travel = self.travel
         self._unknown = dialect.unknown
 
@@ -110,7 +117,7 @@ class ProgramRun:
             except ValueError as fault:  # what a statement began has no end: no statement of its own to name
                 return self._stopped(ProgramFault(last_statement(self.units), str(fault)))
             if left:
-                self._execute(words_of(left, self.rows.data, tuple(self.rows.files)))
+                self._execute(self.rows.words_of(left))
         except Ended:
             return None
         except ProgramFault as fault:
@@ -118,12 +125,6 @@ class ProgramRun:
         except (ArithmeticError, ValueError, KeyError) as fault:
             return self._stopped(ProgramFault(statement_of(fault.__traceback__, self.units), sentence(fault)))
         return None
-
-    def add(self, compiled: Compiled, marker: str) -> None:
-        """Take in the compiled procedures of a file, under the marker of their source."""
-        self.units[marker] = compiled
-        for name, function in compiled.functions.items():
-            self.functions.setdefault(name, function)
 
     def flush(self) -> None:
         """Execute what is pending. Raises Ended if the program has ended with it."""
@@ -176,8 +177,7 @@ class ProgramRun:
         count, numbered, locals_ = whole(times), self.numbered, self.language.locals
         caller, self._frame = self._frame, self._frame_of(place, str(name))
         self._depth += 1
-        self._saved.append(None)
-        self._restored_at_return.append(False)
+        self._saved.append((None, False))
         self.rows.enter(self._frame)
         value = None
         for _ in range(count):
@@ -194,10 +194,9 @@ class ProgramRun:
                     numbered[number] = given
                 value = function(self, {})
                 numbered[1 : locals_ + 1] = outer
-            if self._restored_at_return[-1]:
+            if self._saved[-1][1]:
                 self.modes("restore", place)
         self._saved.pop()
-        self._restored_at_return.pop()
         self._depth -= 1
         self._frame = caller
         self.rows.enter(caller)
@@ -243,15 +242,15 @@ class ProgramRun:
     def modes(self, action: str, place: tuple[int, int, int]) -> None:
         """Save the modal state, forget it, or write the words that restore it."""
         self.flush()
+        saved, at_end = self._saved[-1]
         if action == "forget":
-            self._saved[-1] = None
+            self._saved[-1] = None, at_end
         elif action in ("save", "save until return"):
-            self._saved[-1] = self.system.modes()
-            self._restored_at_return[-1] |= action == "save until return"
-        elif self._saved[-1] is not None:
-            rows = ([(ord(letter), value, place[2]) for letter, value in row] for row in self._saved[-1])
+            self._saved[-1] = self.system.modes(), at_end or action == "save until return"
+        elif saved is not None:
+            rows = ([(ord(letter), value, place[2]) for letter, value in row] for row in saved)
             self._execute_made([TravelRow(words, place[1], self._frame) for words in rows])
-        elif not self._restored_at_return[-1]:
+        elif not at_end:
             raise ValueError("M72 restores the modes that M70 saved in the same call; there are none")
 
     def made(self, maker: Maker, given: tuple[tuple[str, float], ...], place: tuple[int, int, int]) -> None:
@@ -264,7 +263,7 @@ class ProgramRun:
         self.flush()
 
     def _execute_made(self, rows: list[TravelRow]) -> None:
-        self._pass_on(words_of(rows, self.rows.data, tuple(self.rows.files)))
+        self._pass_on(self.rows.words_of(rows))
         self.tick()
 
     def label(self, blocks: dict[int, int], number: float) -> int:
@@ -298,7 +297,7 @@ class ProgramRun:
             if len(self.frames) >= FRAMES_MAX:
                 raise endless(f"{FRAMES_MAX:,} different chains of calls")
             known = self._known_frames[key] = len(self.frames)
-            file = self.units[self.functions[name].__code__.co_filename].places[0].file
+            file = self.units[self.functions[name].__code__.co_filename][0].file
             self.frames.append(Frame(name=name, source=self.files[file], line=place[1], caller=self._frame))
         return known
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.nc.faults import Fault
-from planner.nc.integers import Integers
+from planner.nc.integers import integers_of
+from planner.nc.interpreter import Interpreter
 from planner.nc.language import tree
 from planner.nc.language.detect import bare, computes, ends_frame, may_compute
 from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace
@@ -38,21 +39,24 @@ class SourceLine:
         """A fault of the line, or of what begins at a byte of it."""
         return ProgramFault(self.place if at is None else self.place._replace(at=at), message)
 
+    def require(self, good: object, message: str, at: int | None = None) -> None:
+        """Raise such a fault unless all is good."""
+        if not good:
+            raise self.fault(message, at)
+
 
 class Source:
-    """One file: its words, and the lines among them that may belong to the language.
+    """One file: its words, and the lines among them that may belong to the language."""
 
-    at_tip   : the machine has kinematics: words that switch the tool centre point are read
-    skips    : lines that start with "/" are left out
-    harmless : subprograms of the machine's builder that move nothing, as the machine file says
-    """
-
-    at_tip = skips = False
-    harmless: frozenset[str] = frozenset()
-
-    def __init__(self, words: Words, file: int, first_row: int, begin: int, integers: Integers):
+    def __init__(self, words: Words, file: int, first_row: int, begin: int, interpreter: Interpreter):
         self.words, self.file, self.first_row, self.begin = words, file, first_row, begin
-        self.scale = integers.scale(words)
+        machine = interpreter.machine
+        self.scale = integers_of(machine).scale(words)
+        self.at_tip = interpreter.ignored.at_tip  # words that switch the tool centre point are read
+        self.skips = interpreter.reading.block_delete  # lines that start with "/" are left out
+        # subprograms of the machine's builder that move nothing, as the machine file or the user says
+        given = machine.dialect.subprograms if machine is not None and machine.dialect is not None else ()
+        self.harmless = {*map(str.upper, given), *interpreter.reading.ignore}
         bare_texts = ((row, bare(words.row_text(row))) for row in may_compute(words))
         # rows, ascending, that are statements of the language rather than words
         self.lines = [

@@ -104,7 +104,7 @@ class LineReader(TokenReader):
             self.expect("[", name)
             parameter = self.parameter()
             self.expect("]", "the parameter")
-            return tree.Exists(parameter)
+            return tree.op(name, parameter)
         if name not in self.language.functions:
             return None
         operands = [self.bracket()]

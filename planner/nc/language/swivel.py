@@ -12,16 +12,14 @@ the tool centre point is switched on behind it, so that x, y, z are the tool's t
 Sources: 840D sl, CYCLE800 (bits of MODE); TNC 640, conversational programming, PLANE SPATIAL.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.units import RAD_PER_DEG
 from planner.nc.language.makers import set_frame
-from planner.nc.language.making import Making
+from planner.nc.language.making import Given, Making
+from planner.nc.language.rows import require, turned
 from planner.nc.language.travel import Travel
-from planner.nc.language.travel_rows import turned
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
 
 _ON, _OFF = float(TOOL_POINT_ON[1]), float(TOOL_POINT_OFF[1])
@@ -32,15 +30,14 @@ RETRACTED = "the retraction of CYCLE800 (FR), to places that the machine's data 
 MOVED = "PLANE with MOVE turns the rotary axes where the tool stands, as with TURN"
 
 
-def siemens(making: Making, given: Mapping[str, float]) -> None:
+def siemens(making: Making, given: Given) -> None:
     """CYCLE800(FR, TC, ST, MODE, X0, Y0, Z0, A, B, C, X1, Y1, Z1, DIR ...), arguments as p0, p1 ... Raises
     ValueError."""
     mode = round(given.get("p3", 0.0))
     angles = [given.get(f"p{k}", 0.0) for k in (7, 8, 9)]
     before, behind = (np.array([given.get(f"p{k}", 0.0) for k in part]) for part in ((4, 5, 6), (10, 11, 12)))
-    if any(angles) and mode >> 6:
-        what = f"MODE {mode} of CYCLE800, angles of the rotary axes, solid or projection angles, is not read"
-        raise ValueError(f"{what}; write angles axis by axis (MODE 57 or 27)")
+    what = f"MODE {mode} of CYCLE800, angles of the rotary axes, solid or projection angles, is not read"
+    require(not any(angles) or not mode >> 6, f"{what}; write angles axis by axis (MODE 57 or 27)")
     if round(given.get("p2", 0.0)) % 10 == 1:
         raise ValueError("ST 1 of CYCLE800, a plane on another one, is not read; write its angles from zero")
     if given.get("p0", 0.0) and len(given) > 1:
@@ -56,7 +53,7 @@ def siemens(making: Making, given: Mapping[str, float]) -> None:
     set_frame(making)
 
 
-def heidenhain(making: Making, given: Mapping[str, float]) -> None:
+def heidenhain(making: Making, given: Given) -> None:
     """PLANE and cycle 19: SPA SPB SPC, EULPR EULNU EULROT; `way` one of WAYS, `side` of SEQ. Raises
     ValueError."""
     if "EULNU" in given:

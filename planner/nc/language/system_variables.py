@@ -13,8 +13,8 @@ import numpy as np
 from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language import tree
+from planner.nc.language.rows import FrameParts, require
 from planner.nc.language.travel import Travel
-from planner.nc.language.travel_rows import FrameParts
 from planner.nc.program import PathControl
 from planner.nc.state import FURTHER_SYSTEMS, SYSTEMS, State, System, system_name
 
@@ -101,8 +101,7 @@ class SystemVariables:
     def system(self) -> int:
         """The work coordinate system in force, G54 is 0."""
         system = self.interpreter.state.system
-        if system not in SYSTEMS:
-            raise ValueError(f"{system_name(system)} has no number that a program can ask for here")
+        require(system in SYSTEMS, f"{system_name(system)} has no number that a program can ask for here")
         return SYSTEMS.index(system)
 
     def modes(self) -> Modes:
@@ -176,11 +175,8 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
     state = system.interpreter.state
     tool, none = state.tools.get(state.tool_loaded), state.zeros()
     homes = {5161: state.homes.get(280, none), 5181: state.homes.get(300, none)}
-    for first, place in {
-        **homes,
-        5211: state.g92,
-        5401: state.tool_offset,
-    }.items():  # others than x y z are 0
+    places = homes | {5211: state.g92, 5401: state.tool_offset}
+    for first, place in places.items():  # others than x y z are 0
         if first <= number < first + 3:
             return float(place[number - first])
     if 5221 <= number < 5221 + _OF_ONE * len(SYSTEMS):
@@ -230,7 +226,7 @@ class FanucVariables(SystemVariables):
     def get(self, parameter: int | str, depth: int) -> float:
         """A parameter by its number, `depth` calls open. Raises ValueError for what is not known."""
         assert isinstance(parameter, int)
-        state, cutter, number = self.interpreter.state, self.interpreter.mover.cutter, parameter
+        state, cutter, number = self.interpreter.state, self.interpreter.cutter, parameter
         parts = FrameParts() if self.travel is None else self.travel.parts
         if 4201 <= number <= 4330:
             number -= 200
@@ -274,8 +270,7 @@ class FanucVariables(SystemVariables):
 
     def put(self, number: int, value: float | None) -> None:
         """Assign to a work offset. Raises ValueError for an alarm, and a state that codes change."""
-        if number == 3000:
-            raise ValueError(f"the program raises its alarm {value or 0:g} here")
+        require(number != 3000, f"the program raises its alarm {value or 0:g} here")
         if 3001 <= number <= 3007:
             return  # timers and what the operator may do: nothing moves
         system, axis = _work_offset(number) or (0, 3)

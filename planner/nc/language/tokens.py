@@ -67,6 +67,11 @@ class TokenReader:
         """A fault of a character of the text; of the next token if none is given."""
         raise NotImplementedError
 
+    def require(self, good: object, message: str, at: int | None = None) -> None:
+        """Raise such a fault unless all is good."""
+        if not good:
+            raise self.fault(message, at)
+
     def operand(self, token: Token) -> Expression | None:
         """The value that begins with a token, which has been passed; None if it begins none."""
         raise NotImplementedError

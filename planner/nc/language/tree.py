@@ -75,14 +75,7 @@ class Operation(Value):
     operands: tuple[Expression, ...]
 
 
-@dataclass(unsafe_hash=True, slots=True)
-class Exists(Value):
-    """1 if the parameter has a value, else 0."""
-
-    parameter: Numbered | Named
-
-
-Expression = Number | Numbered | Named | Operation | Exists
+Expression = Number | Numbered | Named | Operation
 Parameter = Numbered | Named
 Assignments = tuple[tuple[Parameter, Expression], ...]
 ZERO, ONE = Number(0.0), Number(1.0)

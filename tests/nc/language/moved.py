@@ -6,10 +6,10 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.machine import Machine
-from planner.nc.language.flat import flat_program
 from planner.nc.program import Kind, Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
+from planner.nc.writer import flat_program
 
 AXES = {a: {"velocity": 100, "acceleration": 1000, "jerk": 1e4} for a in "xyz"}
 

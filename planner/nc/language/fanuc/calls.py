@@ -47,8 +47,7 @@ _LONGEST_NUMBER = 4  # digits of a program's number; those before them in M98 P 
 def subprogram(words: tree.Words, line: SourceLine, known: frozenset[str]) -> list[tree.Statement]:
     """M98. known : the numbers of the file's programs. Raises ProgramFault."""
     rest, given = _split(words, "M98", "PL", line)
-    if "P" not in given:
-        raise line.fault("M98 needs P with the number of a subprogram")
+    line.require("P" in given, "M98 needs P with the number of a subprogram")
     name: str | tree.Expression = given["P"]
     times: tree.Expression = given.get("L", tree.ONE)
     if isinstance(name, tree.Number):

@@ -17,14 +17,15 @@ operator's manual 2017. The half circles of G12 are this reader's: manuals show 
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
 from planner.nc.arcs import IN_PLANE, in_plane
 from planner.nc.language import swivel, tree
-from planner.nc.language.making import Maker, Making, Row, around, equal_steps
+from planner.nc.language.making import Given, Maker, Making, Row, around, equal_steps
+from planner.nc.language.rows import require
 from planner.nc.language.source import SourceLine
 
 AXES = "XYZ"
@@ -48,9 +49,8 @@ def statements(code: str, words: tree.Words, line: SourceLine) -> tuple[list[tre
     else_set = "else by a setting of the control; write the"
     if code == "G51" and not own.keys() & set("PIJK"):
         raise line.fault(f"scaling is by a factor P, or I, J and K, {else_set} scaled coordinates out")
-    if code == "G68" and "R" not in own:
-        what = "rotating the coordinate system is by an angle R"
-        raise line.fault(f"{what}, {else_set} rotated coordinates out")
+    what = "rotating the coordinate system is by an angle R"
+    line.require(code != "G68" or "R" in own, f"{what}, {else_set} rotated coordinates out")
     if code == "G68" and own.keys() & set("IJK"):
         raise line.fault("G68 with I J K turns about an axis in space, and tilts the plane; write moves out")
     return [tree.made(line.place, MAKERS[code], **given)], rest
@@ -65,7 +65,7 @@ def _scale(word: tree.Word, line: SourceLine) -> tree.Expression:
     return value if text[:1] == "." else tree.Number(value.value / 1000.0)
 
 
-def _set(making: Making, code: str, given: Mapping[str, float]) -> None:
+def _set(making: Making, code: str, given: Given) -> None:
     travel, state = making.travel, making.interpreter.state
     parts, here, plane = travel.parts, travel.position(), IN_PLANE[state.normal]
     centre, absolute = here.copy(), making.absolute
@@ -82,23 +82,21 @@ def _set(making: Making, code: str, given: Mapping[str, float]) -> None:
         parts.rotation = 0.0
     elif code == "G51":
         factors = [given.get(letter, given.get("P", 1.0)) for letter in "IJK"]
-        if 0.0 in factors:
-            raise ValueError("a scale of 0 makes a point of everything")
+        require(0.0 not in factors, "a scale of 0 makes a point of everything")
         parts.scale, parts.centre = np.array(factors), centre
     elif code == "G50":
         parts.scale = np.ones(3)
     elif code in _MIRRORS:
-        if not named:
-            raise ValueError(f"{code} needs the axes that it mirrors, and where: {code} X0")
+        require(named, f"{code} needs the axes that it mirrors, and where: {code} X0")
         parts.mirror[named], parts.mirrored_at[named] = -1.0, centre[named]
     else:
         parts.mirror[named or slice(None)] = 1.0
 
 
-def _frame(making: Making, given: Mapping[str, float], *, code: str) -> None:
+def _frame(making: Making, given: Given, *, code: str) -> None:
     """G68 and the others. Raises ValueError."""
     travel = making.travel
-    if making.interpreter.mover.cutter is not None:
+    if making.interpreter.cutter is not None:
         raise ValueError(f"{code} while cutter radius compensation is on; write G40 before it")
     if code == "G69" and not swivel.is_level(travel):
         swivel.tilt(making, np.eye(3), np.zeros(3), swivel.NO_MOVE, 0)
@@ -111,7 +109,7 @@ def _frame(making: Making, given: Mapping[str, float], *, code: str) -> None:
         travel.set_frame(matrix, shift)
 
 
-def _tilted(making: Making, given: Mapping[str, float]) -> None:
+def _tilted(making: Making, given: Given) -> None:
     """G68.2: the plane, at X Y Z, turned by I about z, J about its x and K about its z. Raises ValueError."""
     if given.get("P", 0.0):
         raise ValueError(f"G68.2 P{given['P']:g} is another way to write a plane; write its angles I J K")
@@ -119,7 +117,7 @@ def _tilted(making: Making, given: Mapping[str, float]) -> None:
     swivel.plane(making, swivel.euler(*angles), np.array(shift) * making.unit, swivel.WAYS["STAY"], 0)
 
 
-def _to_plane(making: Making, given: Mapping[str, float]) -> None:
+def _to_plane(making: Making, given: Given) -> None:
     """G53.1: the rotary axes turn to the plane. P1, P2: the tilting axis positive, negative."""
     side = {0: 0, 1: 1, 2: -1}.get(round(given.get("P", 0.0)))
     if side is None:
@@ -127,13 +125,13 @@ def _to_plane(making: Making, given: Mapping[str, float]) -> None:
     swivel.tilt(making, *making.travel.swivelled, swivel.WAYS["TURN"], side)
 
 
-def _polar(making: Making, given: Mapping[str, float]) -> None:
+def _polar(making: Making, given: Given) -> None:
     """G16."""
     here = in_plane(making.travel.position(), making.interpreter.state.normal)
     making.travel.set_polar(0j if making.absolute else here)
 
 
-def _round_pocket(making: Making, given: Mapping[str, float], *, turning: int) -> Iterator[Row]:
+def _round_pocket(making: Making, given: Given, *, turning: int) -> Iterator[Row]:
     """G12 (turning -1) and G13. Raises ValueError."""
     name = "G13" if turning > 0 else "G12"
     if making.interpreter.state.normal != 2 or not given.keys() >= {"I", "Z"}:
@@ -151,7 +149,7 @@ def _round_pocket(making: Making, given: Mapping[str, float], *, turning: int) -
     return around(making, _circles(making, given, sizes, turning), feed=False)
 
 
-def _circles(making: Making, given: Mapping[str, float], sizes: list[float], turning: int) -> Iterator[Row]:
+def _circles(making: Making, given: Given, sizes: list[float], turning: int) -> Iterator[Row]:
     absolute, (x, y, z) = making.absolute, making.here()
     if "X" in given or "Y" in given:
         x, y = (given[c] + (0.0 if absolute else v) if c in given else v for c, v in (("X", x), ("Y", y)))
@@ -167,7 +165,7 @@ def _circles(making: Making, given: Mapping[str, float], sizes: list[float], tur
         yield [("G", code), ("X", x), ("Y", y), ("I", -sizes[-1] / 2.0), ("J", 0.0)]
 
 
-def _pattern(making: Making, given: Mapping[str, float], *, code: str) -> Iterator[Row]:
+def _pattern(making: Making, given: Given, *, code: str) -> Iterator[Row]:
     """G70, G71, G72 of Haas' mills: the places of holes. Raises ValueError."""
     state, count = making.interpreter.state, round(given.get("L", 0.0))
     if state.series is None or not 0 < count <= _HOLES_MAX or "I" not in given:

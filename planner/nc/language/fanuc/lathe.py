@@ -116,10 +116,8 @@ class LatheParser(LatheWords):
         for letter, first_letter in _OF_FIRST_BLOCK[cycle].items():
             if letter not in values and first_letter in before:
                 values[letter] = before[first_letter]
-        if "D" not in values:
-            raise line.fault(
-                _NO_PASSES if cycle == "G73" else _NO_DEPTH.format("U" if cycle == "G71" else "W")
-            )
+        text = _NO_PASSES if cycle == "G73" else _NO_DEPTH.format("U" if cycle == "G71" else "W")
+        line.require("D" in values, text)
         self.body += [shared(values, line), tree.made(line.place, lathe_cycles.read_profile), call]
         self.body.append(of_shared(line.place, cycle, values))
 
@@ -134,8 +132,7 @@ class LatheParser(LatheWords):
             values = {**values, "K": values["P"], "D": values["Q"], **_finishing(first, line)}
             values["I"] = self._length(given["R"], "G76", line) if "R" in given else tree.ZERO
         else:
-            if "D" not in given:
-                raise line.fault("G76 needs D, the depth of the first pass")
+            line.require("D" in given, "G76 needs D, the depth of the first pass")
             # Q is the angle of the spindle where the thread begins
             values = {letter: value for letter, value in values.items() if letter not in "QR"}
             text = "G76 in one block: the control's settings for chamfer, least pass and finishing allowance are taken as 0"

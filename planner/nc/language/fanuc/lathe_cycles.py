@@ -6,14 +6,15 @@ to can be read by others.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
 from planner.base.arrays import FloatArray
 from planner.nc import lathe_cuts, turning
 from planner.nc.faults import Notes
-from planner.nc.language.making import Maker, Making, Row
+from planner.nc.language.making import Given, Maker, Making, Row
+from planner.nc.language.rows import require
 from planner.nc.program import Kind, Program
 from planner.nc.turning import Leg
 
@@ -21,7 +22,6 @@ RETRACT = 0.5  # e where the program does not give it; controls have a setting [
 _NEEDS = "a cycle of a lathe needs G18, G90 and G40, and a work system that is not turned"
 _WRONG = {(Kind.DWELL, Kind.STOP): "a dwell or a stop", (Kind.SPLINE,): "a spline"}
 _START = "_cycle x", "_cycle z"  # shared names of where the tool stood [mm]
-Given = Mapping[str, float]
 
 
 def start(making: Making, given: Given) -> None:
@@ -194,8 +194,7 @@ def _contour_of(program: Program, offset: FloatArray, start: complex) -> turning
     legs, arcs = [], iter(zip(program.arc_center, program.arc_normal, program.arc_sweep, strict=True))
     for kind, end in zip(program.kind.tolist(), program.end, strict=True):
         for kinds, what in _WRONG.items():
-            if kind in kinds:
-                raise ValueError(f"{what} in the profile of a cycle; write it after the cycle")
+            require(kind not in kinds, f"{what} in the profile of a cycle; write it after the cycle")
         point = complex(end[2] - offset[2], end[0] - offset[0])
         if kind == Kind.ARC:
             centre, normal, sweep = next(arcs)
@@ -205,10 +204,8 @@ def _contour_of(program: Program, offset: FloatArray, start: complex) -> turning
             legs.append(Leg(point, 1 if sweep > 0 else -1, middle))
         else:
             legs.append(Leg(point, fast=kind == Kind.RAPID))
-    if not legs:
-        raise ValueError("the profile of the cycle has no moves")
-    if legs[0].turning:
-        raise ValueError("the first move of a profile is straight: G0 or G1 to its first point")
+    require(legs, "the profile of the cycle has no moves")
+    require(not legs[0].turning, "the first move of a profile is straight: G0 or G1 to its first point")
     return turning.Contour(start, legs[0].fast, tuple(legs))
 
 

@@ -273,9 +273,9 @@ class LatheWords(FanucParser):
             if letter in of_cycle:
                 peck = (letter in "QK") == (cycle == "G74")
                 values["K" if peck else "I"] = self._length(of_cycle[letter], cycle, line)
-        if across in values and "I" not in values:
-            shift = "P or I" if cycle == "G74" else "Q or K"
-            raise line.fault(f"{cycle} with {across} needs {shift}, from one cut to the next")
+        shift = "P or I" if cycle == "G74" else "Q or K"
+        text = f"{cycle} with {across} needs {shift}, from one cut to the next"
+        line.require(across not in values or "I" in values, text)
         if relief := of_cycle.get("D", of_cycle.get("R")):
             values["D"] = relief.value
         if cycle in self.retract:

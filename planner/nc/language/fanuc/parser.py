@@ -139,16 +139,15 @@ class FanucParser(LineParser):
 
     def _while(self, reader: LineReader, line: SourceLine) -> None:
         condition = _condition_of(reader)
-        if not reader.take("DO"):
-            raise reader.fault("WHILE [condition] is followed by DO and a number")
+        reader.require(reader.take("DO"), "WHILE [condition] is followed by DO and a number")
         self._do(reader, line, condition)
 
     def _do(self, reader: LineReader, line: SourceLine, condition: tree.Expression = tree.ONE) -> None:
         number = _loop_number(reader)
-        if any(number == loop.label for loop in self.open) or len(self.open) >= _NESTED_MAX:
-            raise line.fault(
-                f"DO {number} inside another DO {number}, or more than {_NESTED_MAX} in each other"
-            )
+        good = all(number != loop.label for loop in self.open) and len(self.open) < _NESTED_MAX
+        line.require(
+            good, f"DO {number} inside another DO {number}, or more than {_NESTED_MAX} in each other"
+        )
         self.begin(tree.OpenStatement("DO", line.place, condition, number))
 
     def _end(self, reader: LineReader, line: SourceLine) -> None:
@@ -184,8 +183,7 @@ class FanucParser(LineParser):
         for target, _ in assignments:
             if target == stop:
                 words = (*words, tree.word("M", line.place.at, 0.0))
-            if target == none:
-                raise line.fault("#0 has no value and cannot be given one")
+            line.require(target != none, "#0 has no value and cannot be given one")
         assignments = tuple(pair for pair in assignments if pair[0] != stop)
         words = self._frames(words, line)
         before, words = self._corner(words, line)

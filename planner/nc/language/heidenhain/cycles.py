@@ -24,7 +24,7 @@ at Q204 above the surface. In all cycles Q200 clearance, Q201 depth, Q203 surfac
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -33,6 +33,7 @@ from typing import Any
 from planner.nc.language.making import (
     BREAK,
     Cycle,
+    Given,
     HolePlan,
     Making,
     Pecks,
@@ -47,6 +48,7 @@ from planner.nc.language.making import (
     tapped,
 )
 from planner.nc.language.milling import ArcSlot, PocketPlan, RoundedRectangle, pocket_rows
+from planner.nc.language.rows import require
 
 _FIRST, _LAST = 200, 385  # Q parameters of cycles
 _FEEDS = (206, 207, 208, 385)  # that inch programs give in tenths of an inch per minute
@@ -58,7 +60,6 @@ _CORNERS = {0: 0j, 1: -1 - 1j, 2: 1 - 1j, 3: 1 + 1j, 4: -1 + 1j}
 _PLUNGED = (
     "plunging on a helix or to and fro needs the angle of the control's tool table: planned straight down"
 )
-Given = Mapping[str, float]
 
 
 def _hole(given: Given, what: str = "hole") -> HolePlan:
@@ -98,8 +99,7 @@ def _breaking(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:
 
 
 def _pecking(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:
-    if given["Q379"]:
-        raise ValueError("Q379, a starting point that is drilled already, is not read")
+    require(not given["Q379"], "Q379, a starting point that is drilled already, is not read")
     return _decreasing(making, hole, given, chip=given["Q257"], ahead=(given["Q258"], given["Q259"]))
 
 
@@ -140,8 +140,7 @@ def _tapped_by_breaks(making: Making, hole: HolePlan, given: Given) -> Iterator[
 
 
 def _milled(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:
-    if given["Q342"]:
-        raise ValueError("Q342, the diameter of a bore that is there already, is not read")
+    require(not given["Q342"], "Q342, the diameter of a bore that is there already, is not read")
     yield from milled(making, hole, given["Q335"], given["Q334"], _turning(making, given))
     yield go(hole.clear)
 
@@ -169,8 +168,7 @@ def _turning(making: Making, given: Given) -> int:
 
 def _plan(making: Making, given: Given) -> PocketPlan:
     kind, radius = round(given["Q215"]), making.tool_radius()
-    if kind not in (0, 1, 2):
-        raise ValueError(f"Q215 {given['Q215']:g} is none of 0 (all), 1 (roughing) and 2 (finishing)")
+    require(kind in (0, 1, 2), f"Q215 {given['Q215']:g} is none of 0 (all), 1 (roughing) and 2 (finishing)")
     if given["Q366"]:
         making.assume(_PLUNGED)
     making.assume("pockets: passes and allowances are those of the cycle, the single paths this reader's own")
@@ -204,11 +202,9 @@ def _place(making: Making, given: Given, half: complex, angle: float, names: dic
 
 def _rectangle(making: Making, given: Given) -> Iterable[Row]:
     a, b = given["Q218"] / 2.0, given["Q219"] / 2.0
-    if min(a, b) <= 0.0:
-        raise ValueError("Q218 and Q219, the sides of the pocket, are to be above 0")
+    require(min(a, b) > 0.0, "Q218 and Q219, the sides of the pocket, are to be above 0")
     corner = max(given["Q220"], making.tool_radius())
-    if given["Q220"] > min(a, b):
-        raise ValueError("Q220, the radius of the corners, is more than half a side")
+    require(given["Q220"] <= min(a, b), "Q220, the radius of the corners, is more than half a side")
     shape, angle = RoundedRectangle(a, b, min(corner, a, b)), given["Q224"]
     at = _place(making, given, complex(a, b), angle, _CORNERS)
     return pocket_rows(shape, _plan(making, given), at, angle)
@@ -216,28 +212,24 @@ def _rectangle(making: Making, given: Given) -> Iterable[Row]:
 
 def _circle(making: Making, given: Given) -> Iterable[Row]:
     size = given["Q223"] / 2.0
-    if size <= 0.0:
-        raise ValueError("Q223, the diameter of the pocket, is to be above 0")
+    require(size > 0.0, "Q223, the diameter of the pocket, is to be above 0")
     at = _place(making, given, 0j, 0.0, {0: 0j})
     return pocket_rows(RoundedRectangle(size, size, size), _plan(making, given), at, 0.0)
 
 
 def _slot(making: Making, given: Given) -> Iterable[Row]:
     a, b = given["Q218"] / 2.0, given["Q219"] / 2.0
-    if not 0.0 < b <= a:
-        raise ValueError("a slot has a width Q219 above 0 and a length Q218 of at least that")
+    require(0.0 < b <= a, "a slot has a width Q219 above 0 and a length Q218 of at least that")
     ends = {0: 0j, 1: -1 + 0j, 2: complex(b / a - 1.0), 3: complex(1.0 - b / a), 4: 1 + 0j}
     at = _place(making, given, complex(a, b), given["Q374"], ends)
     return pocket_rows(RoundedRectangle(a, b, b), _plan(making, given), at, given["Q374"])
 
 
 def _slots_on_circle(making: Making, given: Given) -> Iterable[Row]:
-    if given["Q367"]:
-        raise ValueError("Q367 of cycle 254 other than 0 is not read; give the centre as Q216 and Q217")
+    require(not given["Q367"], "Q367 of cycle 254 other than 0 is not read; give the centre as Q216 and Q217")
     radius, b, sweep = given["Q375"] / 2.0, given["Q219"] / 2.0, math.radians(given["Q248"])
-    if not 0.0 < b < radius or not 0.0 < abs(sweep) < 2.0 * math.pi:
-        text = "a slot on a circle has a width above 0, below the diameter, and opens below 360 degrees"
-        raise ValueError(text)
+    text = "a slot on a circle has a width above 0, below the diameter, and opens below 360 degrees"
+    require(0.0 < b < radius and 0.0 < abs(sweep) < 2.0 * math.pi, text)
     shape, at = ArcSlot(radius, b, math.radians(given["Q376"]), sweep), complex(given["Q216"], given["Q217"])
     for k in range(max(1, equal_steps(given["Q377"], 1.0))):
         yield from pocket_rows(shape, _plan(making, given), at, k * given["Q378"])

@@ -5,7 +5,6 @@ axes.
 """
 
 import re
-from collections.abc import Mapping
 
 from planner.base.units import MM_PER_INCH
 from planner.nc.codes import M_GROUP
@@ -13,7 +12,7 @@ from planner.nc.language import tree
 from planner.nc.language.heidenhain import cycles, moves, tables, text
 from planner.nc.language.heidenhain.flow import Flow, called_file
 from planner.nc.language.heidenhain.moves import Moves
-from planner.nc.language.making import Making, assumed_row
+from planner.nc.language.making import Given, Making, assumed_row
 from planner.nc.language.source import Source
 from planner.nc.language.tree import ZERO, Line, Return, row, word
 from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON, UNKNOWN_M, setting
@@ -56,7 +55,7 @@ def _named(block: text.Block, names: str, start: int, end: int) -> dict[str, tre
     return found
 
 
-def _oversize(making: Making, given: Mapping[str, float]) -> None:
+def _oversize(making: Making, given: Given) -> None:
     """DR of a tool call, by which the tool's radius is larger than in its table until the next call."""
     making.travel.oversize = given["DR"] * making.unit
 

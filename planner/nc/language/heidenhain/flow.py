@@ -116,8 +116,7 @@ class Flow:
             what = f"FN {number} compares with {_FN_IF[number]}" if number else _PLAIN_IF
             raise block.fault(what, begin)
         right = block.value()
-        if not block.take(r"\s*GOTO\s+LBL\s*"):
-            raise block.wrong("GOTO LBL is expected here")
+        block.require(block.take(r"\s*GOTO\s+LBL\s*"), "GOTO LBL is expected here", block.column)
         go: Rows = [tree.Goto(block.place, tree.number(self._label(block)))]
         return [tree.If(block.place, ((tree.op(_COMPARE[compare[1].upper()], left, right), go),), [])]
 

@@ -95,8 +95,7 @@ class Moves:
         turns: tree.Expression | None = None,
     ) -> text.Rows:
         """An arc about the pole."""
-        if given.fast:
-            raise block.fault(_FAST_ARC)
+        block.require(not given.fast, _FAST_ARC)
         words: Words = [("G", code), *self.feed_words(block, given), *ends.items()]
         words += [("IJK"[a], text.POLE[a] - text.POSITION[_AXES[a]]) for a in IN_PLANE[normal]]
         if turns is not None:
@@ -111,16 +110,14 @@ class Moves:
         """CR: an arc of a given radius."""
         if given.radius is None or not given.turn:
             raise block.fault("CR needs R and its direction, DR+ or DR-")
-        if given.fast:
-            raise block.fault(_FAST_ARC)
+        block.require(not given.fast, _FAST_ARC)
         words = [("G", _arc_code(block, given)), *self.feed_words(block, given), *ends.items()]
         words.append(("R", given.radius))
         return [tree.row(block.place, *words, assigned=_assigned(ends))]
 
     def tangent_arc(self, block: text.Block, given: text.Items, ends: Ends) -> text.Rows:
         """CT: the arc that goes on in the direction of the last move."""
-        if given.fast:
-            raise block.fault(_FAST_ARC)
+        block.require(not given.fast, _FAST_ARC)
         arc = tree.made(block.place, makers.tangent_arc, **ends, **dict(self.feed_words(block, given)))
         return [arc, tree.assign(block.place, *_assigned(ends))]
 
@@ -180,8 +177,7 @@ class Moves:
 
 def _arc_code(block: text.Block, given: text.Items) -> tree.Expression:
     """G3 or G2. Raises ProgramFault without a direction."""
-    if not given.turn:
-        raise block.fault("an arc needs its direction: DR+ or DR-")
+    block.require(given.turn, "an arc needs its direction: DR+ or DR-")
     return tree.Number(3.0 if given.turn > 0 else 2.0)
 
 

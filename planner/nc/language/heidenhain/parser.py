@@ -112,8 +112,7 @@ class HeidenhainParser(Definitions):
         along = name[-1:] in set("XYZ") and name.lstrip("I") == name[-1:]  # an axis alone, without L
         name = "L" if along else name
         read = _READ.get(name)
-        if name in ("RND", "CHF"):
-            raise block.fault("RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
+        block.require(name not in ("RND", "CHF"), "RND and CHF stand behind a move: L, LP, C, CR, CT or CP")
         if match is None or read is None:
             why = f" ({_WHY[name]})" if name in _WHY else ""
             if name[:1] == "G" and name[1:].isdigit():
@@ -128,8 +127,7 @@ class HeidenhainParser(Definitions):
         return [*corner, *read(self, block)]
 
     def _ends(self, block: text.Block, given: text.Items) -> dict[str, tree.Expression]:
-        if given.polar:
-            raise block.fault("polar coordinates belong to LP and CP")
+        block.require(not given.polar, "polar coordinates belong to LP and CP")
         ends = {axis: text.absolute(axis, found) for axis, found in given.axes.items()}
         for axis in ends.keys() & set("ABC") if self.shortest else ():
             ends[axis] = position(axis) + tree.op("WRAPPED", ends[axis] - position(axis))
@@ -186,8 +184,7 @@ class HeidenhainParser(Definitions):
         return [*before, *rows, *after]
 
     def _need_pole(self, block: text.Block) -> None:
-        if not self.poles:
-            raise block.fault("there is no pole: write CC before")
+        block.require(self.poles, "there is no pole: write CC before")
 
     def _side(self, block: text.Block, given: text.Items) -> text.Rows:
         if given.side is None or not self.compensates:
@@ -202,9 +199,8 @@ class HeidenhainParser(Definitions):
     def _pole(self, block: text.Block) -> text.Rows:
         column, given = block.column, text.items(block)
         ends = self._ends(block, given) if given.axes else {axis: text.POSITION[axis] for axis in "XY"}
-        if len(ends) == 3 or (len(ends) == 1 and self.moves.tilted):
-            why = "the plane of a pole is that of its two coordinates; write CC with both of them"
-            raise block.fault(why, column)
+        why = "the plane of a pole is that of its two coordinates; write CC with both of them"
+        block.require(len(ends) != 3 and (len(ends) != 1 or not self.moves.tilted), why, column)
         named = [(text.POLE["XYZ".index(axis)], end) for axis, end in ends.items()]
         normal = 2 if len(ends) == 1 else next(k for k in range(3) if "XYZ"[k] not in ends)
         return [tree.assign(block.place, *named, (text.PLANE, normal))]

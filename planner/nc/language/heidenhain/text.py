@@ -81,6 +81,11 @@ class Block:
         """A fault of the character at `column` of the text."""
         return tree.ProgramFault(self.place._replace(at=self.byte(column)), message)
 
+    def require(self, good: object, message: str, column: int = 0) -> None:
+        """Raise such a fault unless all is good."""
+        if not good:
+            raise self.fault(message, column)
+
     def wrong(self, message: str) -> tree.ProgramFault:
         """A fault of what comes next."""
         return self.fault(message, self.column)

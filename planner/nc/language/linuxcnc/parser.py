@@ -79,8 +79,7 @@ class LinuxcncParser(LineParser):
         elif keyword in _ENDS:
             self._end(keyword, label, condition, line)
         elif keyword == "return":
-            if not any(o.kind == "sub" for o in self.open):
-                raise line.fault("return stands in a subprogram only")
+            line.require(any(o.kind == "sub" for o in self.open), "return stands in a subprogram only")
             self.body.append(tree.Return(line.place, condition))
         else:
             if not any(o.kind in ("while", "do", "repeat") and o.label == label for o in self.open):
@@ -170,8 +169,7 @@ class LinuxcncParser(LineParser):
             self.body.append(tree.Call(line.place, name, None, "M98", given.get("L", tree.Number(1.0))))
         else:
             reader.nothing_left("M99")
-            if not self.plain_sub:
-                raise line.fault("M99 ends a subprogram; the main program ends with M2 or M30")
+            line.require(self.plain_sub, "M99 ends a subprogram; the main program ends with M2 or M30")
             self.body.append(tree.Return(line.place))
             if not self.open:
                 self.base = self.body = self.main
@@ -219,8 +217,7 @@ class LinuxcncParser(LineParser):
         arguments: list[tree.Expression] = []
         while reader.peek() == "[":
             arguments.append(reader.bracket())
-        if len(arguments) > ARGUMENTS_MAX:
-            raise line.fault(f"{len(arguments)} arguments; at most {ARGUMENTS_MAX}")
+        line.require(len(arguments) <= ARGUMENTS_MAX, f"{len(arguments)} arguments; at most {ARGUMENTS_MAX}")
         name = "" if not isinstance(label, str) else label if label.isdigit() else f"<{label}>"
         self.body.append(tree.Call(line.place, label, tuple(enumerate(arguments, 1)), f"o{name} call"))
 

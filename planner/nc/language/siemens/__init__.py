@@ -1,2 +1,2 @@
-"""Siemens' language (Sinumerik): `text` expressions, loops and jumps, `commands` and `block_words` commands
-and words, `cycles`, `parser` all of it as statements."""
+"""Siemens' language (Sinumerik): `text` expressions, `control` loops, jumps and variables, `commands` and
+`block_words` commands and words, `cycles`, `parser` all of it as statements."""

@@ -14,24 +14,24 @@ from collections.abc import Callable
 from functools import partial
 
 from planner.base.units import MM_PER_INCH
+from planner.nc.arcs import PLANES
 from planner.nc.language import makers, tree
 from planner.nc.language.corner_moves import KINDS as CORNERS
 from planner.nc.language.making import assumed_row
 from planner.nc.language.siemens import cycles, tables
-from planner.nc.language.siemens.places import AXES, Places, Row
+from planner.nc.language.siemens.commands import AXES, Commands, Row
 from planner.nc.language.siemens.text import LineTokens
 
 # G40, G41, G42: off, left and right of the path; commands of arcs by their makers.
 _SIDES = {40: 0.0, 41: 1.0, 42: -1.0}
 _ARCS = {"CIP": makers.arc_through, "CT": makers.tangent_arc}
 EACH_LINE = "CIP and CT are read in each of their lines; write it again, or G1, G2 or G3"
-_PLANES = {17: 2, 18: 1, 19: 0}
 _TAPS = (331, 332, 63)
 _WORDS = "XYZIJKFSTMDHABCUVW"
 _MAIN = "1"  # S1= and M1= are those of the first spindle, which is planned; others are left out
 
 
-class BlockWords(Places):
+class BlockWords(Commands):
     """Rows of words.
 
     circular : CIP or CT was written, and no other motion code since
@@ -161,8 +161,7 @@ class BlockWords(Places):
 
     def _circle(self, reader: LineTokens, row: Row) -> None:
         """The arc of CIP or CT, which takes the row's coordinates and feed."""
-        if not row.arc:
-            raise reader.fault(EACH_LINE, 0)
+        reader.require(row.arc, EACH_LINE, 0)
         given = self._absolutes(row.take("XYZF"))
         self.body.append(tree.made(reader.place, _ARCS[row.arc], **row.through, **given))
 
@@ -195,9 +194,8 @@ class BlockWords(Places):
     def _code(self, reader: LineTokens, code: int, at: int) -> list[tree.Word]:
         if code in (90, 91):
             self.absolute = code == 90
-            if reader.peek() == "(":
-                raise reader.fault(f"G{code}(...) is not read")
-        self.normal = _PLANES.get(code, self.normal)
+            reader.require(reader.peek() != "(", f"G{code}(...) is not read")
+        self.normal = PLANES.get(code, self.normal)
         if code in (70, 71, 700, 710):
             self.unit = MM_PER_INCH if code in (70, 700) else 1.0
         if f"G{code}" in tables.REFUSED and not (code == 451 and not self.compensates):
@@ -213,9 +211,8 @@ class BlockWords(Places):
             return [tree.word("G", at, float(code))]
         if code in (74, 75):
             return self._home(reader, code, at)
-        if code not in tables.CODES:
-            text = f"G{code}: no G code of a Sinumerik that is read; write what it does there in other codes"
-            raise reader.fault(text, at - reader.start)
+        text = f"G{code}: no G code of a Sinumerik that is read; write what it does there in other codes"
+        reader.require(code in tables.CODES, text, at - reader.start)
         more = []
         if code >= tables.SYSTEMS_FURTHER + 5 and tables.CODES[code] == (54.1,):
             more = [tree.word("P", at, float(code - tables.SYSTEMS_FURTHER))]
@@ -228,8 +225,7 @@ def _skip(reader: LineTokens) -> None:
     """Go past what stands in brackets behind a command, and behind its equals sign."""
     depth = 0
     while reader.peek() in ("(", "[") or depth:
-        if reader.ended:
-            raise reader.fault(") is missing")
+        reader.require(not reader.ended, ") is missing")
         found = reader.pop().text
         depth += (found in ("(", "[")) - (found in (")", "]"))
     if reader.take("="):

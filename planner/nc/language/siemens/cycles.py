@@ -22,15 +22,17 @@
 Arguments of later controls behind these change the meaning of others, where they are not as in _MORE: refused.
 """
 
+import cmath
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 
 from planner.base.units import SECONDS_PER_MINUTE
-from planner.nc.language import tree
+from planner.nc.language import milling, tree
 from planner.nc.language.making import (
     Cycle,
+    Given,
     HolePlan,
     Making,
     Pecks,
@@ -43,7 +45,7 @@ from planner.nc.language.making import (
     pecked,
     tapped,
 )
-from planner.nc.language.siemens.pockets import depth_of, hole_of, pocket, require_depth, required, slots
+from planner.nc.language.rows import require
 
 _DEPTH = ("RTP", "RFP", "SDIS", "DP", "DPR")
 _CUTTING = ("MID", "FAL", "FALD", "FFP1", "FFD", "CDIR", "VARI", "MIDA", "AP1")
@@ -76,7 +78,33 @@ RADIAL = ("SLOT1", "SLOT2", "LONGHOLE")
 _APART = 1.0  # mm by which the tool goes back to break a chip, and above the depth already drilled where feed begins
 _SHORT = 1e-9  # an infeed that is none
 _LEFT = 4.0  # SDIR, SDAC: M4
-Given = Mapping[str, float]
+_OVERLAP = 0.8  # of the tool's diameter between two paths, where MIDA is 0
+_SAID = "{0}: passes and allowances are those of the cycle, the single paths this reader's own"
+
+
+def _required(name: str, given: Container[str], *keys: str) -> None:
+    """Raises ValueError for arguments that a cycle lacks."""
+    for key in keys:
+        require(key in given, f"{name} needs {key}")
+
+
+def _require_depth(name: str, given: Container[str], absolute: str, below: str) -> None:
+    """Raises ValueError where neither of two arguments gives a depth."""
+    require(absolute in given or below in given, f"{name} needs {absolute} or {below}")
+
+
+def _depth_of(given: Given, absolute: str, below: str) -> float:
+    """A depth, absolute or below the reference plane."""
+    return given[absolute] if absolute in given else given["RFP"] - abs(given[below])
+
+
+def _hole_of(name: str, given: Given) -> HolePlan:
+    """The depths of a cycle. Raises ValueError."""
+    _required(name, given, "RTP", "RFP", "SDIS")
+    _require_depth(name, given, "DP", "DPR")
+    top = given["RFP"]
+    clear, bottom = top + abs(given["SDIS"]), _depth_of(given, "DP", "DPR")
+    return HolePlan(clear, top, bottom, given["RTP"], None, given.get("DTB", 0.0))
 
 
 def check(name: str, given: Mapping[str, tree.Expression]) -> None:
@@ -88,9 +116,9 @@ def check(name: str, given: Mapping[str, tree.Expression]) -> None:
             text = f"{key} {value.value:g} of {name} is not read: it changes what the other arguments mean, or how it is cut; "
             raise ValueError(text + f"read is {' or '.join(map(str, allowed))}")
     if name in _DRILLING:
-        required(name, given, "RTP", "RFP", "SDIS")
+        _required(name, given, "RTP", "RFP", "SDIS")
         for pair in (("DP", "DPR"), ("FDEP", "FDPR"))[: 1 + (name == "CYCLE83")]:
-            require_depth(name, given, *pair)
+            _require_depth(name, given, *pair)
 
 
 def _in_seconds(making: Making, given: Given) -> Given:
@@ -106,8 +134,7 @@ def _in_seconds(making: Making, given: Given) -> Given:
 
 def _lead(given: Given, unit: float) -> float:
     size, lead = given.get("MPIT", 0.0), given.get("PIT", 0.0)
-    if size and lead:
-        raise ValueError("MPIT and PIT both give the lead; write one of them")
+    require(not size or not lead, "MPIT and PIT both give the lead; write one of them")
     return lead or (coarse_lead(abs(size), unit) * (1.0 if size > 0.0 else -1.0) if size else 0.0)
 
 
@@ -115,7 +142,7 @@ def _tapped(making: Making, given: Given, hole: HolePlan, *, rigid: bool) -> Ite
     """CYCLE84, and CYCLE840 with a chuck, at the speed of the program and without a lead at its F."""
     lead, speed = _lead(given, making.unit), making.interpreter.state.spindle.speed
     if rigid:
-        required("CYCLE84", given, "SST")
+        _required("CYCLE84", given, "SST")
         return tapped(making, hole, lead, given["SST"], back=given.get("SST1", 0.0))
     if lead == 0.0 and speed > 0.0:
         lead = making.interpreter.state.feed * SECONDS_PER_MINUTE / making.unit / speed
@@ -123,7 +150,7 @@ def _tapped(making: Making, given: Given, hole: HolePlan, *, rigid: bool) -> Ite
 
 
 def _reamed(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
-    required("CYCLE85", given, "FFR", "RFF")
+    _required("CYCLE85", given, "FFR", "RFF")
     yield from drilled(replace(hole, feed=given["FFR"]))
     yield go(hole.clear, given["RFF"])
 
@@ -153,10 +180,9 @@ def _bored(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
 
 def _deep(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
     less, last, apart = given.get("DAM", 0.0), given.get("DTD", 0.0), _APART / making.unit
-    if less < 0.0:
-        raise ValueError("DAM below 0 of CYCLE83, infeeds as shares, is not read; give their difference")
+    require(less >= 0.0, "DAM below 0 of CYCLE83, infeeds as shares, is not read; give their difference")
     pecks = Pecks(
-        max(hole.top - depth_of(given, "FDEP", "FDPR"), _SHORT),
+        max(hole.top - _depth_of(given, "FDEP", "FDPR"), _SHORT),
         back=given.get("VRT", 0.0) or apart,
         ahead=(given.get("DIS1", 0.0) or apart,) * 2,
         less=less,
@@ -168,11 +194,103 @@ def _deep(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
     return pecked(replace(hole, dwell=last) if last > 0.0 else hole, pecks)
 
 
+def _slots(making: Making, given: Given, *, name: str) -> Iterator[Row]:
+    """SLOT1, SLOT2 and LONGHOLE: pockets, each turned about the circle's middle."""
+    needed = {"SLOT1": ("LENG", "WID"), "SLOT2": ("AFSL", "WID"), "LONGHOLE": ("LENG",)}[name]
+    _required(name, given, "NUM", "CPA", "CPO", "RAD", "FFP1", *needed)
+    hole, radius, size = _hole_of(name, given), making.tool_radius(), given["RAD"]
+    half = given["WID"] / 2.0 if "WID" in needed else radius
+    making.assume(_SAID.format(name))
+    if name != "SLOT2":
+        making.assume(f"{name}: LENG is the whole length of the slot, which begins at RAD")
+    kind, turn = given.get("VARI", 0.0), given.get("CDIR", 2.0)
+    plan = replace(
+        _cutting(making, name, {**given, "VARI": kind % 10 + 1.0, "CDIR": turn}, radius),
+        depth=replace(hole, what="slot"),
+        finish_infeed=given.get("MIDF", 0.0),
+        finish_feed=given.get("FFP2", 0.0) or given["FFP1"],
+    )
+    if not kind and plan.side:
+        plan = replace(plan, walls=True)
+    count = round(given["NUM"])
+    step = given.get("INDA", 0.0) or 360.0 / count
+    shape: milling.PocketShape = milling.ArcSlot(size, half, 0.0, math.radians(given.get("AFSL", 0.0)))
+    if name != "SLOT2":
+        shape = milling.RoundedRectangle(given["LENG"] / 2.0, half, half)
+    for k in range(count):
+        angle = given.get("STA1", 0.0) + k * step
+        middle = cmath.rect(size + given["LENG"] / 2.0, math.radians(angle)) if name != "SLOT2" else 0.0
+        yield from milling.pocket_rows(shape, plan, complex(given["CPA"], given["CPO"]) + middle, angle)
+
+
+def _pocket(making: Making, given: Given, *, name: str) -> Iterator[Row]:
+    """POCKET3 and POCKET4. Raises ValueError."""
+    _required(name, given, "RTP", "RFP", "SDIS", "DP", "PA", "PO", "FFP1", "CDIR", "VARI")
+    for key in ("AP1", "AP2", "AD"):
+        text = f"{key} of {name}, a pocket that is there already, is not read; leave it out"
+        require(not given.get(key), text)
+    radius = making.tool_radius()
+    plan = _cutting(making, name, given, radius)
+    making.assume(_SAID.format(name))
+    shape = _shape(name, given, radius)
+    if plan.plunge == milling.HELIX and plan.helix[0] > shape.room - radius - plan.side:
+        raise ValueError(f"the helix of RAD1 {plan.helix[0]:g} has no room beside the tool in {name}")
+    return milling.pocket_rows(shape, plan, complex(given["PA"], given["PO"]), given.get("STA", 0.0))
+
+
+def _shape(name: str, given: Given, radius: float) -> milling.PocketShape:
+    if name == "POCKET4":
+        _required(name, given, "PRAD")
+        size = given["PRAD"]
+        require(size > 0.0, "PRAD, the radius of POCKET4, is to be above 0")
+        return milling.RoundedRectangle(size, size, size)
+    _required(name, given, "LENG", "WID")
+    corner = given.get("CRAD", 0.0) or radius
+    if min(given["LENG"], given["WID"]) <= 0.0:
+        raise ValueError("LENG and WID of POCKET3 are to be above 0; dimensions from a corner are not read")
+    require(corner >= radius, f"the corners of POCKET3 have a radius of {corner:g}; the tool has {radius:g}")
+    a, b = given["LENG"] / 2.0, given["WID"] / 2.0
+    if corner > min(a, b):
+        raise ValueError(f"the corners of POCKET3 have a radius of {corner:g}: more than half its width")
+    return milling.RoundedRectangle(a, b, corner)
+
+
+def _cutting(making: Making, name: str, given: Given, radius: float) -> milling.PocketPlan:
+    kind, plunge = round(given["VARI"]) % 10, round(given["VARI"]) // 10
+    if kind not in (1, 2) or plunge not in (0, 1, 2):
+        raise ValueError(f"VARI {given['VARI']:g} of {name} is not read; read are 1, 2, 11, 12, 21 and 22")
+    if plunge == 2 and not (given.get("RAD1", 0.0) > 0.0 and given.get("DP1", 0.0) > 0.0):
+        raise ValueError("plunging on a helix needs RAD1 and DP1, above 0")
+    turn = {0: 1, 1: -1, 2: -1, 3: 1}.get(round(given["CDIR"]))
+    if turn is None:
+        raise ValueError(f"CDIR {given['CDIR']:g} of {name} is none of 0, 1, 2 and 3")
+    if given["CDIR"] in (0.0, 1.0) and making.interpreter.state.spindle.turning < 0:
+        turn = -turn  # climb milling with M4
+    return milling.PocketPlan(
+        depth=replace(_hole_of(name, given), what="pocket"),
+        radius=radius,
+        infeed=given.get("MID", 0.0),
+        step=given.get("MIDA", 0.0) or _OVERLAP * 2.0 * radius,
+        feed=given["FFP1"],
+        plunge_feed=given.get("FFD", 0.0),
+        finish_feed=given["FFP1"],
+        turning=turn,
+        side=given.get("FAL", 0.0),
+        floor=given.get("FALD", 0.0),
+        rough=kind == 1,
+        walls=kind == 2,
+        base=kind == 2 and given.get("FALD", 0.0) > 0.0,
+        finish_infeed=given.get("MID", 0.0),
+        plunge=(milling.RAPID, milling.STRAIGHT, milling.HELIX)[plunge],
+        helix=(given.get("RAD1", 0.0), given.get("DP1", 0.0)),
+    )
+
+
 def _drilling(name: str, rows: Callable[[Making, Given, HolePlan], Iterator[Row]]) -> Cycle:
     """The cycle of a hole: its rows, then up to the retract plane."""
 
     def cycle(making: Making, given: Given) -> Iterator[Row]:
-        hole = hole_of(name, given)
+        hole = _hole_of(name, given)
         yield from rows(making, given, hole)
         yield go(hole.retract)
 
@@ -190,14 +308,13 @@ _HOLES: dict[str, Callable[[Making, Given, HolePlan], Iterator[Row]]] = {
 }
 _CYCLES: dict[str, Cycle] = {
     **{name: _drilling(name, rows) for name, rows in _HOLES.items()},
-    "CYCLE86": lambda making, given: _bored(making, given, hole_of("CYCLE86", given)),
-    **{name: partial(pocket, name=name) for name in POCKETS},
-    **{name: partial(slots, name=name) for name in RADIAL},
+    "CYCLE86": lambda making, given: _bored(making, given, _hole_of("CYCLE86", given)),
+    **{name: partial(_pocket, name=name) for name in POCKETS},
+    **{name: partial(_slots, name=name) for name in RADIAL},
 }
 
 
 def cycle_rows(making: Making, given: Given, *, name: str) -> Iterator[Row]:
     """The rows of a cycle in G17, with G90 and the feed as before. Raises ValueError."""
-    if making.interpreter.state.normal != 2:
-        raise ValueError(f"{name} in G18 or G19 is not read; write G17 before it")
+    require(making.interpreter.state.normal == 2, f"{name} in G18 or G19 is not read; write G17 before it")
     return around(making, _CYCLES[name](making, _in_seconds(making, given)), feed=False)

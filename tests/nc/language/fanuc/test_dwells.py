@@ -8,10 +8,10 @@ from same_program import STRICT, machine, same_motion
 
 from planner.base.errors import InputError
 from planner.machine import Machine
-from planner.nc.language.flat import flat_program
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
+from planner.nc.writer import flat_program
 
 FANUC, LINUXCNC = Reading(dialect="fanuc"), Reading(dialect="linuxcnc")
 HEAD = "G21 G90 F240 S700 M3 G99\n"

@@ -13,10 +13,10 @@ from test_agreement import MACHINE, assert_same_motion, offsets_in_inches
 
 from planner.base.errors import InputError
 from planner.machine import DialectData, Machine
-from planner.nc.language.flat import flat_program
 from planner.nc.program import Kind, Program
 from planner.nc.reader import interpret, parse_program
 from planner.nc.reading import AS_USUAL
+from planner.nc.writer import flat_program
 
 HEAD = "G21 G98 F100\nG0 X40 Z2\n"
 PROFILE = "N10 G0 X20\nG1 Z-10 F50\nX30 Z-15\nG2 X40 Z-20 R5\nN20 G1 W-5\n"

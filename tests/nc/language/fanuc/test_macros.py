@@ -7,9 +7,9 @@ from language_programs import same
 
 from planner.base.errors import InputError
 from planner.machine import DialectData, Machine
-from planner.nc.language.flat import flat_program
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
+from planner.nc.writer import flat_program
 
 FANUC = {
     "vacant": ("G1 X1 Y#5\n#1=#5\nIF [#1 EQ #0] GOTO 10\nX99\nN10 #1=0\nIF [#1 EQ #0] GOTO 20\nX[#5+2]\nN20 M30", "G1 X1\nX2"),

@@ -8,10 +8,10 @@ from language_programs import same
 
 from planner.base.errors import InputError
 from planner.machine import ToolData, load_machine
-from planner.nc.language.flat import flat_program
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
+from planner.nc.writer import flat_program
 
 MILL = load_machine("mill")
 SMALL_TOOL = MILL.model_copy(

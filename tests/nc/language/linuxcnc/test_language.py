@@ -15,9 +15,9 @@ from language_programs import Generator, same
 from oracle import Canon, ask_oracle, needs_oracle, recorded
 from test_agreement import assert_same_motion
 
-from planner.nc.language.flat import flat_program
 from planner.nc.reader import interpret, parse_program, read_program
 from planner.nc.reading import Reading
+from planner.nc.writer import flat_program
 
 # --- against LinuxCNC -----------------------------------------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from benchmarks.judge.setpoints import trajectory_of
 from planner import JointLimit, PathLimit
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.feedrate.constraints.axis_limits import JUMP
+from planner.feedrate.constraints.built_in import JUMP
 from planner.feedrate.constraints.limit import RowPoint
 from planner.feedrate.constraints.limits import (
     JERK,

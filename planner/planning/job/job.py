@@ -168,10 +168,8 @@ class Job:
     def _delivered(
         self, motion: MotionInTime, not_limited: tuple[str, ...], seed: int
     ) -> tuple[Delivered, periods.Standing]:
-        """Trajectory and verdict, and where the motion was made to stand longer.
-
-        seed : of the times at which the verifier looks; another one if a verdict was fed back into the motion
-        """
+        """Trajectory and verdict, and where the motion was made to stand longer. `seed` is of the times at which the
+        verifier looks; another one if a verdict was fed back into the motion."""
         machine, toolpath = self.real
         with self.stage("sample"):
             stands = periods.standing(motion, toolpath, machine, "jerk" not in not_limited)

@@ -39,12 +39,10 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.sensitivity.bends import Chains, best_division
-from planner.sensitivity.corner_speeds import legs_between
+from planner.sensitivity.bends import Chains, best_division, turns_of
 from planner.sensitivity.sampled_lines import chain_times, chains_of, sampled_legs
 from planner.sensitivity.straight_time import TINY, End, straight_time
-from planner.sensitivity.turning_back import turns_of
-from planner.sensitivity.waypoints import Way, way_of
+from planner.sensitivity.waypoints import Way, legs_between, way_of
 
 ROUNDING = 2e-6  # by how much limits may be exceeded by a motion that passes [-]
 HEADS = 60  # numbers of legs that are tried as one straight way from rest, evenly in their logarithm

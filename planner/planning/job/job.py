@@ -253,6 +253,12 @@ class Job:
             timings=self.stages.timings,
         )
 
+    def unsolved(self, method: str, status: Status, sentence: str) -> Plan:
+        """The plan of a job for which there is no motion."""
+        return self.plan(
+            None, method=method, corner=None, solver="", status=status, sentence=sentence, grid_points=0
+        )
+
     def _ringing(self, made: Delivered | None, method: str) -> Iterator[str]:
         """That vibration modes are excited, if they are; method fir makes filters that leave them at rest."""
         shaped = made is None or isinstance(made.motion, ShapedMotion)

@@ -12,6 +12,6 @@ What was tried to make them cheaper and brought nothing, so that it is not tried
                    chords between looks, right motions were refused; the worst of each quantity found by a kernel of its
                    own: numpy's division and argmax are as fast (but not as one pass for all of them: planner/verifier/limits.py);
                    motions of long runs evaluated together: what they take is arithmetic, not calls (of short runs it is
-                   calls: planner/joint/splice.py)
+                   calls: planner/joint/parts.py)
     kernels        in numba's own cache, in three ways: results/first-run.md
 """

@@ -28,7 +28,7 @@ AREAS = {
     "bound": tuple(
         f"planner/sensitivity/{name}.py"
         for name in (
-            "least_time", "straight_time", "corner_speeds", "bends", "waypoints", "turning_back", "sampled_*", "linear_program",
+            "least_time", "straight_time", "bends", "waypoints", "sampled_*", "linear_program",
         )
     ),
 }  # fmt: skip

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.feedrate.constraints import speed_limits
+from planner.feedrate.constraints import built_in
 from planner.feedrate.constraints.problem import FeedrateProblem
 
 if (
@@ -222,7 +222,7 @@ def _problem(
     """From rest to rest. Bounds on the feed at the two ends, which are at rest, are those of their neighbours: where a spline
     starts with derivative 0, there would be none."""
     points, axes = right[0].shape
-    bound, axis = speed_limits.feed_sq_max(right[0][1:-1], limits.velocity)
+    bound, axis = built_in.feed_sq_max(right[0][1:-1], limits.velocity)
     slower = bound < limits.feed**2
     bound = np.where(slower, bound, limits.feed**2)
     return FeedrateProblem(

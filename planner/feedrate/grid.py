@@ -25,7 +25,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.feedrate.constraints.assemble import feedrate_problem, interval_feed_sq_max
-from planner.feedrate.constraints.axis_limits import feed_sq_at_constant_speed
+from planner.feedrate.constraints.built_in import feed_sq_at_constant_speed
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.reachability import Reachability
 from planner.feedrate.sampling.path_samples import PathSamples

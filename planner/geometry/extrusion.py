@@ -158,13 +158,7 @@ def _before(at: Array, lasts: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def _joints(end, ends, full_stop, apart):
-    """Indices of the joints where the ratio may change: full stops, and ends of blocks far enough behind the
-    last.
-
-    end   : (M,) way at the end of each segment [mm]
-    ends  : (M,) True where its block ends
-    apart : (M,) how far is far enough there [mm]
-    """
+    """Indices of the joints where the ratio may change: full stops, and ends of blocks `apart` [mm] behind the last."""
     found = np.empty(len(end) + 1, np.int64)
     found[0], count, last = 0, 1, 0.0
     for i in range(len(end)):

@@ -198,15 +198,9 @@ def links_anywhere(chain, point):
 @njit(cache=True, error_model="numpy", nogil=True)
 def _forward(chain, before, point, feed, fresh, low, high, cost, widest):
     """Go on with points (n, A) behind the point `before`, which can be at the links `low` to `high`; `fresh`
-    if there is none before.
-
-    cost   : (K,) of the best assignment that ends at each of these links; those of the last point are written
-             into it
-    widest : budgets are widened up to so many times [-]
-
-    Returns whether there is any assignment, the fields of `_Marks`, and the links that the last point can be
-    at.
-    """
+    if there is none before. The best assignment that ends at each link has the `cost` (K,), overwritten with that of
+    the last point; budgets are widened `widest` times at most. Returns whether there is any, the fields of `_Marks`,
+    and the links of the last point."""
     vertex, at_vertex, budget = chain.vertex, chain.at_vertex, chain.budget
     skipped, cap = chain.skipped, chain.feed
     count, links = len(point), len(budget)

@@ -112,11 +112,7 @@ def _apart_sq(point, vertex):
 
 @njit(cache=True, error_model="numpy")
 def _nearest(spans, of, points, near, least, vertex, bisections, out):
-    """The place [mm] nearest to a vertex, downhill from the point `near` and not before `least`.
-
-    of     : (n,) the span that each point begins
-    points : (n, A) [mm] and (n,) their places [mm]
-    """
+    """The place [mm] nearest to a vertex, downhill from the point `near` and not before `least`."""
     point, at = points
     m, last = near, len(at) - 1
     while m < last and (at[m] < least or _apart_sq(point[m + 1], vertex) < _apart_sq(point[m], vertex)):
@@ -164,12 +160,7 @@ def _in_order_places(spans, of, points, near, marks, begin, end, out, passes):
 
 @njit(cache=True, error_model="numpy")
 def _pass_runs(spans, run_first, segments, chain, marks, place):
-    """Write into place (M+1,) where the runs (Q,) pass the starts of their segments but the first.
-
-    run_first : (Q+1,) first span of each run
-    segments  : (Q,) first and (Q,) last segment of each run
-    marks     : `_Marks`
-    """
+    """Write into place (M+1,) where the runs (Q,) pass the starts of their segments but the first."""
     low, high = segments
     vertex, at_vertex, budget, skipped, feed, segment_of, first = chain
     axes = vertex.shape[1]

@@ -25,7 +25,6 @@ from planner.joint.checks import Keeps, chord_means, worst_shares
 from planner.joint.groups import Search, Sweep, Task, searched
 from planner.joint.guess import CutMotion, Guess, unit_of
 from planner.joint.interior_point import Tuning
-from planner.joint.law_again import PULL_AGAIN, SLID, TOLD, law_shares, strain, tightened
 from planner.joint.law_window import NEAR, Window, near
 from planner.joint.legs import LegFormulas
 from planner.joint.motion import Steps, closed_at_nodes
@@ -36,6 +35,7 @@ from planner.joint.price import columns, step_prices
 from planner.joint.problem import NARROWED, SEEN, StepWindow, window_of
 from planner.joint.row_kinds import H_MIN
 from planner.joint.run import TubeRun
+from planner.joint.shares import PULL_AGAIN, SLID, TOLD, law_shares, strain, tightened
 from planner.joint.switches import Beside, no_rows_beside, switches_missed
 from planner.joint.window_solver import Asked, Solved
 
@@ -63,6 +63,9 @@ TIGHTER, MORE, PULL_OF_CHORDS = 1.002, 2.0, 0.01
 # if that is worth this share of the time [-]
 # (`python -m benchmarks.net.ablation ROWS --net NET --without SHORTENED`).
 SHORTENED = 1e-3
+# A window that fails is divided, and searched once more from around: else one of thousands ends the search of its run
+# (`python -m benchmarks.cost.long_jobs stellabee1`: 1,614 s on its path, 1,284 s). Nodes that stay are made slower before, so
+# that fewer windows fail.
 # Rounding of limits, as a share of them [-].
 ROUNDING = 1e-9
 KEPT = "no faster motion was found there"

@@ -1,8 +1,15 @@
 """The solution along a run as parts of a motion: steps of constant jerk, and between them the start's motion
-where it stays."""
+where it stays. Each goes from rest to rest, or the next one goes on as it ends, so that nothing jumps where
+they meet.
+"""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +18,134 @@ from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.joint.motion import Steps
 from planner.joint.run import TubeRun
-from planner.joint.splice import SplicedRun
 from planner.motion.axis_motion import AxisMotion
+from planner.motion.timing import MotionInTime
+from planner.motion.trajectory import Trajectory
+
+# Times closer than this are the same [s]: rounding of sums of durations.
+SAME_TIME = 1e-9
+RATES = ("velocity", "acceleration", "jerk", "feed")  # 0 at standstill
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SplicedRun:
+    """A motion from `begin` to `end` [s], at rest at both times, and a standstill of `hold` [s] behind it. If
+    it is `moving` at its end, the next one begins with the same position, velocity and acceleration."""
+
+    motion: MotionInTime
+    begin: float
+    end: float
+    hold: float = 0.0
+    moving: bool = False
+
+    @property
+    def lasting(self) -> float:
+        """How long it takes, with the standstill [s]."""
+        return self.end - self.begin + self.hold
+
+
+def _columns(motion: MotionInTime, times: FloatArray) -> dict[str, Array]:
+    """Those of the motion at ascending times (T,). A trajectory of each of thousands of runs would take longer to be
+    checked than to be evaluated."""
+    if isinstance(motion, AxisMotion):
+        return motion.columns(times)
+    seen = motion.at(times, 1.0)
+    return {name: getattr(seen, name) for name in ("position", "block", "line", "s", *RATES)}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Spliced:
+    """n runs of motions, one after the other."""
+
+    runs: tuple[SplicedRun, ...]
+
+    @cached_property
+    def begin(self) -> FloatArray:
+        """(n+1,) when the runs begin, and when the last one ends [s]."""
+        return np.append(0.0, np.cumsum([run.lasting for run in self.runs]))
+
+    @property
+    def end(self) -> float:
+        """End of the last run [s]."""
+        return float(self.begin[-1])
+
+    @cached_property
+    def t(self) -> FloatArray:
+        """(L,) start of each piece [s]."""
+        edges = []
+        for run, begin in zip(self.runs, self.begin, strict=False):
+            inner = run.motion.t[(run.motion.t > run.begin) & (run.motion.t < run.end)]
+            stands = [begin + run.end - run.begin] if run.hold > 0 else []
+            edges.append(np.concatenate([[begin], begin + inner - run.begin, stands]))
+        return np.maximum.accumulate(np.concatenate(edges))
+
+    @cached_property
+    def length(self) -> FloatArray:
+        """(n+1,) arc length at the start of each run, and at the end [mm]."""
+        return np.append(0.0, np.cumsum(np.diff(self._own_length, axis=1)))
+
+    @cached_property
+    def _own_length(self) -> FloatArray:
+        """(n, 2) arc length in the motion of each run where that begins and ends [mm]."""
+        return np.array([_columns(run.motion, np.array([run.begin, run.end]))["s"] for run in self.runs])
+
+    def at(self, times: FloatArray, dt: float) -> Trajectory:
+        """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
+        period."""
+        of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
+        edges = np.append(np.flatnonzero(np.diff(of, prepend=-1)), len(of))
+        # Without times there are the columns of the first run, without rows.
+        parts = [(int(of[lo]), lo, hi) for lo, hi in pairwise(edges.tolist())] or [(0, 0, 0)]
+        seen = [self._seen(k, times[lo:hi]) for k, lo, hi in parts]
+        columns: dict[str, Any] = {name: np.concatenate([one[name] for one in seen]) for name in seen[0]}
+        one = self.runs[0].motion.at(np.array([self.runs[0].begin]), dt)
+        return dataclasses.replace(one, t=times, **columns)
+
+    def _seen(self, k: int, times: FloatArray) -> dict[str, Array]:
+        """The columns of the motion of run k at these times."""
+        run = self.runs[k]
+        local = run.begin + (times - self.begin[k])
+        if run.moving:  # rounding of times: its end belongs to the next one
+            local = np.minimum(local, np.nextafter(run.end, run.begin))
+        single = np.minimum(local, run.end)
+        which: Array | slice = slice(None)
+        if not (np.diff(single) > 0.0).all():
+            single, which = np.unique(single, return_inverse=True)
+        columns = {name: column[which] for name, column in _columns(run.motion, single).items()}
+        columns["s"] = self.length[k] + columns["s"] - self._own_length[k, 0]
+        over = local >= run.end  # there another motion may begin
+        if over.any():
+            for name in RATES:
+                columns[name] = columns[name].copy()
+                columns[name][over] = 0.0
+        return columns
+
+    def whole(self) -> AxisMotion:
+        """As one motion; every run has to be all of a motion that is given axis by axis."""
+        motions = [run.motion for run in self.runs if isinstance(run.motion, AxisMotion)]
+        assert len(motions) == len(self.runs)
+        names = ("position", "velocity", "acceleration", "jerk", "block", "line")
+        return AxisMotion(
+            axes=motions[0].axes,
+            radius=motions[0].radius,
+            t=np.concatenate([begin + m.t for m, begin in zip(motions, self.begin, strict=False)]),
+            end=self.end,
+            **{name: np.concatenate([getattr(m, name) for m in motions]) for name in names},
+        )
+
+    def waiting(self, at: FloatArray, by: FloatArray) -> Spliced:
+        """The motion standing longer by `by` (n,) [s] where it comes to rest, at the times `at` (n,) [s]."""
+        runs = []
+        for k, run in enumerate(self.runs):
+            stand = self.begin[k] + run.end - run.begin
+            behind = np.abs(at - stand) <= SAME_TIME
+            inside = (at > self.begin[k] + SAME_TIME) & (at < stand - SAME_TIME)
+            motion, more = run.motion, float(by[inside].sum())
+            if more > 0:
+                motion = motion.waiting(at[inside] - self.begin[k] + run.begin, by[inside])
+            hold = run.hold + float(by[behind].sum())
+            runs.append(replace(run, motion=motion, end=run.end + more, hold=hold))
+        return Spliced(runs=tuple(runs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +161,7 @@ class FoundRun:
     kept: Array | None = None  # (N,) steps that stand for the motion of the start; None for none
     # (N, 3 A + 5) what the limits of each step cost (price.py) [s]; None where the solver does not tell
     price: FloatArray | None = None
-    coarser: "FoundRun | None" = None  # what the search in longer steps had found, which this began with
+    coarser: FoundRun | None = None  # what the search in longer steps had found, which this began with
 
     @property
     def whole(self) -> bool:

@@ -118,10 +118,7 @@ def _nearest(d, v, a, j, h, places):
 @njit(cache=True, error_model="numpy")
 def _least(vertex, begin, jerk, h, way):
     """Of steps outwards from a vertex, with way = -1 backwards: the least distance, the step of it, and the smallest f
-    in it until then.
-
-    begin (n, 3, A) of the inner node of each, jerk (n, A), h (n,), outwards
-    """
+    in it until then."""
     axes, best, at, low = len(vertex), np.inf, 0, 0.0
     d, v, j, places = np.zeros(axes), np.zeros(axes), np.zeros(axes), np.zeros(DEGREE + 2)
     for i in range(len(h)):

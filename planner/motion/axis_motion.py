@@ -168,10 +168,7 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 
 @njit(cache=True, error_model="numpy")
 def _sample(pieces, times):
-    """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,).
-
-    pieces : t, position, velocity, acceleration, jerk, s and end of `AxisMotion`
-    """
+    """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,)."""
     t, position, velocity, acceleration, jerk, s, end = pieces
     samples, axes = len(times), position.shape[1]
     columns = np.empty((4, samples, axes))

@@ -137,15 +137,11 @@ def _latest(seen, wanted, within):
 @njit(cache=True, error_model="numpy")
 def _pass(seen, wanted, latest, times, i, share, last_part):
     """Write into times (M+1,) when the polyline `seen` is nearest to each vertex from vertex i on, as far as
-    it goes; of the last part to the end. The place reached is at the `share` of the first chord.
+    it goes, and of the last part to the end; each at the way run `latest` [mm] at most. Returned are the next vertex,
+    and the chord reached with the share of it.
 
-    seen   : samples of the motion from the chord on that was reached: positions (T, A) [mm], way run (T,)
-             [mm] and times (T,) [s]
-    wanted : vertices (M+1, A) [mm], lengths (M,) of the segments after them, and by how much the way run may
-             differ (M,) [mm]
-    latest : (M+1,) the way run at which a vertex is passed at most [mm]
-
-    Returns the next vertex, and the place reached: chord and share of it.
+    seen   : positions (T, A) [mm], way run (T,) [mm] and times (T,) [s], from the chord on that was reached
+    wanted : vertices (M+1, A) [mm], lengths (M,) behind them, and by how much the way run may differ (M,) [mm]
     """
     position, s, t = seen
     vertex, length, slack = wanted

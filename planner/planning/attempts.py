@@ -89,16 +89,7 @@ def _in_motion(job: Job, settings: Settings, tried: Tried) -> Tried:
         return tried
     first = first_motion(led, settings) if asked else None
     why = SEARCHED_ONLY if first is None else why_not(between_leads(first.motion(), job, led), job)
-    none = job.plan(
-        None,
-        method=settings.method,
-        corner=None,
-        solver="",
-        status=Status.INFEASIBLE,
-        sentence=why,
-        grid_points=0,
-    )
-    return dataclasses.replace(tried, best=none)
+    return dataclasses.replace(tried, best=job.unsolved(settings.method, Status.INFEASIBLE, why))
 
 
 def _not_ended(job: Job, settings: Settings, tried: Tried) -> bool:

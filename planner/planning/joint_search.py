@@ -25,11 +25,10 @@ from planner.joint.groups import searched
 from planner.joint.guess import Cut, Guess
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
-from planner.joint.parts import FoundRun, parts_of
+from planner.joint.parts import FoundRun, SplicedRun, parts_of
 from planner.joint.refine import divided, searched_again
 from planner.joint.run import TubeRun, tube_runs_of
 from planner.joint.solvers import TubeSolver, search_with
-from planner.joint.splice import SplicedRun
 from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion
 from planner.planning.job.by_run import RunsInTime, full_stops

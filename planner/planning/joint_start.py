@@ -17,8 +17,8 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.limits import Limits
 from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guesses_from
+from planner.joint.parts import Spliced, SplicedRun
 from planner.joint.run import TubeRun
-from planner.joint.splice import Spliced, SplicedRun
 from planner.motion.timing import MotionInTime
 from planner.planning.job.by_run import RunsInTime
 from planner.planning.job.job import Job

@@ -15,9 +15,8 @@ from planner.feedrate.constraints.limits import ACCELERATION, CHORD_ERROR, FEED,
 from planner.geometry.toolpath import Toolpath
 from planner.joint import price
 from planner.joint.motion import Steps
-from planner.joint.parts import FoundRun
+from planner.joint.parts import FoundRun, Spliced, SplicedRun
 from planner.joint.shares import shares
-from planner.joint.splice import Spliced, SplicedRun
 from planner.motion.slowed import Slowed
 from planner.motion.timing import MotionInTime
 from planner.sensitivity.activity import HELD, NONE, REST, times_of

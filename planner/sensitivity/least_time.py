@@ -39,17 +39,14 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.sensitivity.bends import Chains, best_division
-from planner.sensitivity.corner_speeds import legs_between
+from planner.sensitivity.bends import Chains, best_division, turns_of
 from planner.sensitivity.sampled_lines import chain_times, chains_of, sampled_legs
 from planner.sensitivity.straight_time import TINY, End, straight_time
-from planner.sensitivity.turning_back import turns_of
-from planner.sensitivity.waypoints import Way, way_of
+from planner.sensitivity.waypoints import Way, legs_between, way_of
 
 ROUNDING = 2e-6  # by how much limits may be exceeded by a motion that passes [-]
 HEADS = 60  # numbers of legs that are tried as one straight way from rest, evenly in their logarithm
 RUNS = 1000  # of which ends and turning back are looked at, the longest ones
-LONG = 20.0  # tolerances: of lines whose y stays their tangent, for what their corners add
 ROUNDS, LARGE, ROUNDS_OF_LARGE = 100, 100_000, 30  # of fitting y, and for more legs than so many
 LINEAR = "xyz"
 
@@ -84,11 +81,10 @@ def _best_of_runs(
     way: Way, y: FloatArray, more: FloatArray, runs: Array
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(Q,) what the legs of each run take at least, its y (N, A), and what each leg adds (N,): of tangents, of y that fit
-    the tolerance, and of these but on long lines with corners; `runs` (Q,) begin at these legs."""
+    the tolerance, and of these but on lines with corners; `runs` (Q,) begin at these legs."""
     fitted, step = _fitted(way, y), np.diff(way.point, axis=0)
-    clear = (more > 0.0) & (way.length > LONG * np.maximum(way.tolerance[:-1], way.tolerance[1:]))
-    mixed = np.where(clear[:, None], y, fitted)
-    of_legs = ((y, more), (fitted, 0.0 * more), (mixed, np.where(clear, more, 0.0)))
+    mixed = np.where((more > 0.0)[:, None], y, fitted)
+    of_legs = ((y, more), (fitted, 0.0 * more), (mixed, more))
     legs = [(one * step).sum(axis=1) + added for one, added in of_legs]
     jumps = [np.append(_jumps(way, one), 0.0) for one, _ in of_legs]
     values = np.array([np.add.reduceat(leg - jump, runs) for leg, jump in zip(legs, jumps, strict=True)])

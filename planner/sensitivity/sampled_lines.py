@@ -29,7 +29,6 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.sensitivity.corner_speeds import Legs, legs_between
 from planner.sensitivity.linear_program import Programme, bounds_by_part, multipliers_by_part
 from planner.sensitivity.sampled_rows import (
     Layout,
@@ -41,7 +40,7 @@ from planner.sensitivity.sampled_rows import (
     differences,
 )
 from planner.sensitivity.straight_time import TINY, Bounds, End, largest_speed, straight_time
-from planner.sensitivity.waypoints import Way
+from planner.sensitivity.waypoints import Legs, Way, legs_between
 
 SAMPLES = 20  # of a line on each side
 OF_CORNER = 10  # the same where a corner is looked at alone

@@ -14,7 +14,7 @@ from random_problems import line
 from planner.base.errors import NotSolvedError
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.feedrate.constraints import axis_limits, curvature_limits, speed_limits
+from planner.feedrate.constraints import built_in
 from planner.feedrate.constraints.assemble import feedrate_problem
 from planner.feedrate.constraints.problem import FeedrateProblem
 from planner.feedrate.sampling.samples import sample_path
@@ -81,7 +81,7 @@ def one(value: float) -> np.ndarray[Any, np.dtype[np.float64]]:
 @given(st.floats(0.0, 2 * np.pi), positive, positive)
 def test_axis_velocity_is_used_up(angle: float, vx: float, vy: float) -> None:
     d1, limits = np.array([[np.cos(angle), np.sin(angle)]]), np.array([vx, vy])
-    x, axis = speed_limits.feed_sq_max(d1, limits)
+    x, axis = built_in.feed_sq_max(d1, limits)
     used = np.abs(d1[0]) * np.sqrt(x[0]) / limits
     assert used.max() == pytest.approx(1.0)
     assert used.argmax() == axis[0] or used[0] == pytest.approx(used[1])
@@ -89,14 +89,14 @@ def test_axis_velocity_is_used_up(angle: float, vx: float, vy: float) -> None:
 
 @given(curvature, positive)
 def test_normal_acceleration_is_used_up(kappa: float, limit: float) -> None:
-    assert kappa * curvature_limits.feed_sq_within(one(kappa), limit)[0] == pytest.approx(limit)
+    assert kappa * built_in.feed_sq_within(one(kappa), limit)[0] == pytest.approx(limit)
 
 
 @given(curvature, st.floats(1e-6, 1.0), st.floats(1e-4, 1e-2))
 def test_chord_error_is_used_up(kappa: float, share: float, dt: float) -> None:
     """The sagitta R (1 - cos(F dt / 2R)) is within the tolerance, and equals it for tolerances small beside the radius."""
     tol = 0.2 * share / kappa
-    x = curvature_limits.feed_sq_within(one(kappa), one(tol), dt**2 / 8.0)[0]
+    x = built_in.feed_sq_within(one(kappa), one(tol), dt**2 / 8.0)[0]
     half = 0.5 * np.sqrt(x) * dt * kappa
     sagitta = 2.0 * np.sin(half / 2.0) ** 2 / kappa
     assert sagitta <= tol * (1 + 1e-12)
@@ -105,7 +105,7 @@ def test_chord_error_is_used_up(kappa: float, share: float, dt: float) -> None:
 
 @given(curvature, positive, st.lists(st.floats(1e-3, 0.1), min_size=1, max_size=3))
 def test_filter_error_is_used_up(kappa: float, tol: float, lengths: list[float]) -> None:
-    x = curvature_limits.feed_sq_of_filters(one(kappa), one(tol), tuple(lengths))[0]
+    x = built_in.feed_sq_of_filters(one(kappa), one(tol), tuple(lengths))[0]
     assert kappa * x * sum(T * T for T in lengths) / 24.0 == pytest.approx(tol)
 
 
@@ -115,14 +115,14 @@ def test_filter_error_is_that_of_a_moving_average() -> None:
     half = 0.5 * feed / radius * length
     error = radius * (1.0 - np.sin(half) / half)
     assert error == pytest.approx(8.3292e-3, rel=1e-5)
-    x = curvature_limits.feed_sq_of_filters(one(1.0 / radius), one(error), (length,))[0]
+    x = built_in.feed_sq_of_filters(one(1.0 / radius), one(error), (length,))[0]
     assert x == pytest.approx(feed**2, rel=1e-3)
     assert x < feed**2
 
 
 @given(curvature, st.floats(1e-3, 1.0), st.lists(st.floats(1e-3, 0.1), min_size=1, max_size=3))
 def test_phase_lag_is_used_up(kappa: float, angle: float, lengths: list[float]) -> None:
-    x = curvature_limits.feed_sq_of_lag(one(kappa), angle, tuple(lengths))[0]
+    x = built_in.feed_sq_of_lag(one(kappa), angle, tuple(lengths))[0]
     assert np.sqrt(x) * kappa * sum(lengths) / 2.0 == pytest.approx(angle)
 
 
@@ -131,14 +131,14 @@ def test_curvature_jump_is_used_up(kappa: float, angle: float, ax: float, ay: fl
     before, after = np.zeros((1, 2)), kappa * np.array([[np.cos(angle), np.sin(angle)]])
     limits = np.array([ax, ay])
     for pair in ((before, after), (after, before)):
-        x, _ = axis_limits.feed_sq_at_jump(*pair, limits)
+        x, _ = built_in.feed_sq_at_jump(*pair, limits)
         assert (np.abs(after - before)[0] * x[0] / limits).max() == pytest.approx(1.0)
 
 
 def test_straight_lines_are_not_limited() -> None:
     flat = np.zeros(3)
-    assert np.isinf(curvature_limits.feed_sq_within(flat, 1.0)).all()
-    assert np.isinf(curvature_limits.feed_sq_within(flat, np.ones(3), 1e-7)).all()
-    assert np.isinf(curvature_limits.feed_sq_of_filters(flat, np.ones(3), (0.01,))).all()
-    assert np.isinf(curvature_limits.feed_sq_of_lag(flat, 0.1, (0.01,))).all()
-    assert np.isinf(axis_limits.feed_sq_at_jump(np.zeros((3, 2)), np.zeros((3, 2)), np.ones(2))[0]).all()
+    assert np.isinf(built_in.feed_sq_within(flat, 1.0)).all()
+    assert np.isinf(built_in.feed_sq_within(flat, np.ones(3), 1e-7)).all()
+    assert np.isinf(built_in.feed_sq_of_filters(flat, np.ones(3), (0.01,))).all()
+    assert np.isinf(built_in.feed_sq_of_lag(flat, 0.1, (0.01,))).all()
+    assert np.isinf(built_in.feed_sq_at_jump(np.zeros((3, 2)), np.zeros((3, 2)), np.ones(2))[0]).all()

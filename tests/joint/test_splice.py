@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rest_motion import along_x
 
-from planner.joint.splice import Spliced, SplicedRun
+from planner.joint.parts import Spliced, SplicedRun
 
 JERK = 1e4
 FIRST, SECOND = along_x(1.0, JERK), along_x(2.0, JERK, start=1.0, slower=1.3)

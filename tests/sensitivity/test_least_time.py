@@ -19,11 +19,10 @@ from planner.geometry.build import toolpath_from_program
 from planner.machine import Axis, Fir, Machine, load_machine
 from planner.nc.program import Program
 from planner.planning.job.plan import Plan
-from planner.sensitivity.corner_speeds import confined, legs_between
+from planner.sensitivity.bends import extremes, spans
 from planner.sensitivity.least_time import least_time
 from planner.sensitivity.straight_time import Bounds, End, straight_time
-from planner.sensitivity.turning_back import extremes, spans
-from planner.sensitivity.waypoints import Way, way_of
+from planner.sensitivity.waypoints import Way, confined, legs_between, way_of
 
 MILL = load_machine("mill")
 WAYS = (

@@ -1,11 +1,11 @@
-"""Where parts between extremes may begin and end (planner/sensitivity/turning_back.py)."""
+"""Where parts between extremes may begin and end (planner/sensitivity/bends.py)."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from planner.sensitivity.turning_back import turns_of
+from planner.sensitivity.bends import turns_of
 from planner.sensitivity.waypoints import Way
 
 

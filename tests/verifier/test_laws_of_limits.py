@@ -17,7 +17,8 @@ from benchmarks.judge.setpoints import trajectory_of
 from planner import JointLimit, PathLimit
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
-from planner.feedrate.constraints.axis_limits import JUMP
+from planner.feedrate.constraints.assemble import user_inside
+from planner.feedrate.constraints.built_in import JUMP
 from planner.feedrate.constraints.limit import RowPoint
 from planner.feedrate.constraints.limits import (
     JERK,
@@ -29,7 +30,6 @@ from planner.feedrate.constraints.limits import (
     Limits,
 )
 from planner.feedrate.constraints.on_grid import OnGrid
-from planner.feedrate.constraints.user_limits import user_inside
 from planner.feedrate.sampling.samples import sample_path
 from planner.motion.limits_used import ratios
 from planner.verifier import verify

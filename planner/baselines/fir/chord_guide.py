@@ -162,11 +162,7 @@ def _circle_speeds(
 
 @njit(cache=True, error_model="numpy")
 def _evaluate(on, chords, start, end):
-    """Point and arc-length derivatives at start and end of all chords, into start and end (n, 4, A).
-
-    on     : `ElementIntervals`
-    chords : (P,) how many each interval is cut into
-    """
+    """Point and arc-length derivatives at start and end of all chords, into start and end (n, 4, A)."""
     work = np.empty((2, 4, start.shape[2]))
     n = 0
     for i in range(len(on.element)):

@@ -49,7 +49,7 @@ from planner.baselines.fir.guide import per
 from planner.baselines.fir.measure import slowest
 from planner.baselines.fir.slow_down import BEYOND, Made, SpeedPlan, settled_fastest, slowing
 from planner.corners.fir import overlap_time
-from planner.feedrate.constraints.curvature_limits import feed_sq_of_filters, feed_sq_of_lag
+from planner.feedrate.constraints.built_in import feed_sq_of_filters, feed_sq_of_lag
 from planner.machine import Machine
 
 # Rounds until everything gets slower with the filters at their longest, so that it ends.

@@ -207,11 +207,8 @@ def _apart(guide: LegGuide, speed: FloatArray, tied: Array, filters: FloatArray)
 
 @njit(cache=True, error_model="numpy")
 def _flow_speeds(joint, tied, speed, line, allowed, T1, T2):
-    """Largest speeds at the flow joints (n,) [mm/s] by the rule of the module's text, inf where `speed` (n,) is not too
-    fast.
-
-    allowed : error at each joint (n,) [mm], acceleration of the axes (A,) and normal acceleration [mm/s2]
-    """
+    """Largest speeds at the flow joints (n,) [mm/s] by the rule of the module's text, inf where `speed` (n,) is
+    slow enough."""
     out, k = np.empty(len(joint)), 0
     error_max, a_max, normal_max = allowed
     for n in range(len(joint)):
@@ -231,11 +228,7 @@ def _flow_speeds(joint, tied, speed, line, allowed, T1, T2):
 
 @njit(cache=True, error_model="numpy")
 def _at_speed(i, between, V, line, a_max, T1, T2):
-    """Error [mm], largest ratio of the axes' accelerations, and acceleration [mm/s2] at joint i, run through
-    at V.
-
-    between : the standstills before and behind it
-    """
+    """Error [mm], largest ratio of the axes' accelerations, and acceleration [mm/s2] at joint i, run through at V."""
     s, direction, (low, high) = line.s, line.direction, between
     first, last, reach = i, i, V * (T1 + T2) / 2.0
     while first - 1 > low and s[i] - s[first - 1] < reach and i - first < FLOW_JOINTS:

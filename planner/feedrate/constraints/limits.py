@@ -15,16 +15,21 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.corners.budget import largest_normal
-from planner.feedrate.constraints.axis_limits import AxisAcceleration, AxisJerk, DrivePower
-from planner.feedrate.constraints.curvature_limits import (
+from planner.feedrate.constraints.built_in import (
+    AxisAcceleration,
+    AxisJerk,
+    AxisVelocity,
     ChordError,
+    DrivePower,
     FilterError,
     NormalAcceleration,
     PhaseLag,
+    ProgrammedFeed,
+    TangentialAcceleration,
+    TangentialJerk,
+    binding,
 )
 from planner.feedrate.constraints.limit import AxisLimit, Limit, RowLimit
-from planner.feedrate.constraints.speed_limits import AxisVelocity, ProgrammedFeed
-from planner.feedrate.constraints.tangential import TangentialAcceleration, TangentialJerk, binding
 from planner.machine import Machine
 from planner.machine.user_limit import OwnLimit
 

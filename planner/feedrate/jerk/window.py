@@ -161,10 +161,7 @@ class ScaledWindow:
         return self._without_multipliers()
 
     def _starts(self, behind: Way | None) -> Iterator[Way]:
-        """Profiles to start from, scaled, the best first.
-
-        behind : the way to rest from the first point on, in the problem's units; None from rest
-        """
+        """Profiles to start from, scaled, the best first; from rest, or on the way to rest that is known, `behind`."""
         for x, u in self._from_rest():
             if behind is None:
                 yield Way(x, u)

@@ -125,10 +125,7 @@ class JerkLimitedNLP:
 def _solve_piece(
     problem: FeedrateProblem, g: int, guess: FeedrateSolution, settings: JerkLimitedNLP
 ) -> Found:
-    """Transcribe and solve piece g; the whole formulation, from top to bottom.
-
-    The columns are those of `piecewise.Found`.
-    """
+    """Transcribe and solve piece g; the whole formulation, from top to bottom."""
     ca = import_needed("casadi", f"solver {settings.solver}")
 
     here = slice(problem.piece[g], problem.piece[g + 1])

@@ -125,12 +125,7 @@ def _measure(table, element, segment, ends, limits, work, points):
 @njit(cache=True, error_model="numpy")
 def _subdivide(table, row, limits, resolution, rest, work, out):
     """Halve a row until every part's error is below `resolution`; right ends into out, returns their number.
-
-    rest : distances from the last full stop of the row's ends, of the next stop from the last, and the length
-           of the first interval after a stop; intervals grow in proportion to their distance from the nearer
-           stop
-    work : (5, 4, A)
-    """
+    Intervals grow in proportion to their distance from the nearer full stop, of which `rest` tells."""
     from_a, from_b, to_next, shortest = rest
     wa, wb = row.w0, row.w1
     stack = np.empty(HALVINGS_MAX + 1)

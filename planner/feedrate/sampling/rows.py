@@ -207,12 +207,8 @@ def _pace(limits):
 
 @njit(cache=True, error_model="numpy")
 def _cut_span(rows, n, span, curve, seg, passed, limits, longest):
-    """Rows of the span that is element `curve` and begins in segment `seg`, cut where the feed changes;
-    returns the rows, their number and the segment in which the span ends.
-
-    passed  : (M+1,) as in `Joints`
-    limits  : `_Pace`
-    """
+    """Rows of the span that is element `curve` and begins in segment `seg`, cut where the feed changes; returns
+    the rows, their number and the segment in which the span ends."""
     feed, changes = limits.feed, limits.changes
     begin, end = span.begin, span.begin + span.width
     least = FREE_PART_MIN * span.width

@@ -157,10 +157,8 @@ def straight(legs: Array, element: Array) -> Array:
 
 
 def _corner_breaks(path: SmoothPath) -> FloatArray:
-    """(R+1, B) parameters where each corner starts with a grid point, ascending, padded with 1.
-
-    Quarters besides the shape's own breaks, so that no symmetric half is mistaken for a straight line.
-    """
+    """(R+1, B) parameters where each corner starts with a grid point, ascending, padded with 1: the shape's breaks,
+    and quarters, so that no symmetric half is mistaken for a straight line."""
     always = (0.25, 0.5, 0.75)
     blended = np.flatnonzero(path.d > 0)
     width = 3 if not len(blended) else max(len(path.corner.breaks(path.params[blended[0]])), 1) + 8

@@ -171,10 +171,8 @@ def _between(
     cap: FloatArray | float = np.inf,
     beyond: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A bound (P,) kept between points, by how much it was short in the middles (n,), and how it changes.
-
-    cap, beyond : at the points and of the intervals, what the bound cannot be reached beyond: what it is there does not count
-    """
+    """A bound (P,) kept between points, by how much it was short in the middles (n,), and how it changes. What a bound
+    is above `cap` and `beyond` does not count: it cannot be reached."""
     bound = np.minimum(bound, cap)
     middle, *ends = (np.minimum(one, beyond) for one in (middle, bound[at], bound[at + 1]))
     share = np.minimum(2.0 * middle / (ends[0] + ends[1]), 1.0)

@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.base.arrays import Array, FloatArray
 from planner.geometry.toolpath import Joint, Toolpath
-from planner.joint.splice import SplicedRun
+from planner.joint.parts import SplicedRun
 from planner.motion.timing import MotionInTime, in_chunks
 from planner.motion.trajectory import joined
 from planner.motion.vertex_times import passing_times, standstills

@@ -168,10 +168,8 @@ class Job:
     def _delivered(
         self, motion: MotionInTime, not_limited: tuple[str, ...], seed: int
     ) -> tuple[Delivered, periods.Standing]:
-        """Trajectory and verdict, and where the motion was made to stand longer.
-
-        seed : of the times at which the verifier looks; another one if a verdict was fed back into the motion
-        """
+        """Trajectory and verdict, and where the motion was made to stand longer. `seed` is of the times at which the
+        verifier looks; another one if a verdict was fed back into the motion."""
         machine, toolpath = self.real
         with self.stage("sample"):
             stands = periods.standing(motion, toolpath, machine, "jerk" not in not_limited)
@@ -253,6 +251,12 @@ class Job:
             making=None if made is None else Making(*made[2:5], tables.priced, given_up),
             notes=(*job_notes(self.program, *self.real), *given_up),
             timings=self.stages.timings,
+        )
+
+    def unsolved(self, method: str, status: Status, sentence: str) -> Plan:
+        """The plan of a job for which there is no motion."""
+        return self.plan(
+            None, method=method, corner=None, solver="", status=status, sentence=sentence, grid_points=0
         )
 
     def _ringing(self, made: Delivered | None, method: str) -> Iterator[str]:

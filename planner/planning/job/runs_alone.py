@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import FloatArray
-from planner.joint.splice import Spliced, SplicedRun
+from planner.joint.parts import Spliced, SplicedRun
 from planner.planning.job.by_run import RunsInTime, broken_runs, full_stops, job_of_run
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Delivered, Plan

@@ -14,10 +14,9 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.names import QUICK
 from planner.joint.groups import searched
-from planner.joint.parts import FoundRun, parts_of
+from planner.joint.parts import FoundRun, Spliced, parts_of
 from planner.joint.run import TubeRun, tube_runs_of
 from planner.joint.solvers import TubeSolver, tube_solver
-from planner.joint.splice import Spliced
 from planner.nc.program import Program
 from planner.planning.job.job import Job
 from planner.planning.job.plan import Delivered, Plan

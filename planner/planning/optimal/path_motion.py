@@ -64,9 +64,7 @@ def plan_on_path(
     try:
         found = [known[0] if known else time_optimal(job, settings, laid)]
     except NotSolvedError as fault:  # no grid follows the path
-        return job.plan(
-            None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0, sentence=str(fault)
-        )  # fmt: skip
+        return job.unsolved(settings.method, Status.NUMERICAL_ERROR, str(fault))
     if job.machine.normal_acceleration != job.real[0].normal_acceleration:
         found = [found.pop().held_by_filters()]
     if not found[0].solution.solved:

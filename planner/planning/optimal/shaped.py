@@ -243,10 +243,8 @@ def _said(job: Job, shaper: Shaper) -> str:
 def _plan_of(job: Job, settings: Settings, found: Shaped | None) -> Plan:
     """The candidate, delivered and judged."""
     if found is None:
-        return job.plan(
-            None, method=settings.method, corner=None, solver="", status=Status.NUMERICAL_ERROR, grid_points=0,
-            sentence="no motion was found that keeps limits and tolerance behind the shaper; plan without --shaped",
-        )  # fmt: skip
+        none = "no motion was found that keeps limits and tolerance behind the shaper; plan without --shaped"
+        return job.unsolved(settings.method, Status.NUMERICAL_ERROR, none)
     # D is measured behind filters (settling.py), and p is made slower for it
     made = job.deliver(found.delivered, settings.not_limited)._replace(filtered=True)
     plan = plan_of_solution(job, found.planned, made, settings)

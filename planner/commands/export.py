@@ -302,6 +302,6 @@ def report_command(
 
     file = output or directory / REPORT
     check_file(file, force=force)
-    plan, summary, text = saved_plan(directory)
-    write_whole(file, report_page(plan, text, summary, units))
+    plan, summary = saved_plan(directory)
+    write_whole(file, report_page(plan, summary, units))
     say(str(file))

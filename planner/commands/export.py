@@ -109,8 +109,7 @@ def export_command(
     if for_ in PROGRAMS:
         _program(plan, for_, output, tolerance)
         return
-    from planner.controls.export.stream import write_stream
-    from planner.controls.export.tables import STRAIGHT, Table, laser_power, write_table
+    from planner.controls.export.tables import STRAIGHT, Table, laser_power, write_stream, write_table
     from planner.report.trajectory_reader import read_trajectory, trajectory_file
 
     with _new_directory(output) as new:

@@ -11,7 +11,7 @@ from planner.base.arrays import FloatArray
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.machine.kinematics import Chain, kinematics_of
-from planner.machine.kinematics.along_path import in_rad
+from planner.machine.kinematics.chain import in_rad
 from planner.machine.kinematics.limits import LinearJoint
 from planner.motion.chain_setpoints import joint_setpoints
 from planner.motion.trajectory import Trajectory

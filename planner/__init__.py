@@ -35,27 +35,33 @@ from typing import TYPE_CHECKING, Any
 from planner.planning.job.shown import VIEWS
 
 if TYPE_CHECKING:
-    from planner.base.errors import InputError, NotSolvedError
-    from planner.corners.own import PolynomialCorner
-    from planner.geometry.toolpath import Toolpath
-    from planner.machine import Machine, load_machine
-    from planner.machine.user_limit import JointLimit, PathLimit
-    from planner.motion.trajectory import Trajectory
-    from planner.nc.program import Program
-    from planner.nc.reader import read_program
-    from planner.nc.reading import Reading
-    from planner.planning.job.plan import Plan
-    from planner.planning.job.trace import Trace
-    from planner.planning.methods.listing import MethodNames
-    from planner.planning.methods.registry import plan
-    from planner.planning.page import Method
-    from planner.report.compare import compare
-    from planner.report.interactive.points import path, stretched, verify
-    from planner.verifier import Verdict
+    from planner.base.errors import InputError as InputError
+    from planner.base.errors import NotSolvedError as NotSolvedError
+    from planner.corners.own import PolynomialCorner as PolynomialCorner
+    from planner.geometry.toolpath import Toolpath as Toolpath
+    from planner.machine import Machine as Machine
+    from planner.machine import load_machine as load_machine
+    from planner.machine.user_limit import JointLimit as JointLimit
+    from planner.machine.user_limit import PathLimit as PathLimit
+    from planner.motion.trajectory import Trajectory as Trajectory
+    from planner.nc.program import Program as Program
+    from planner.nc.reader import read_program as read_program
+    from planner.nc.reading import Reading as Reading
+    from planner.planning.job.plan import Plan as Plan
+    from planner.planning.job.trace import Trace as Trace
+    from planner.planning.methods.listing import MethodNames as MethodNames
+    from planner.planning.methods.registry import plan as plan
+    from planner.planning.page import Method as Method
+    from planner.report.compare import compare as compare
+    from planner.report.interactive.points import path as path
+    from planner.report.interactive.points import stretched as stretched
+    from planner.report.interactive.points import verify as verify
+    from planner.verifier import Verdict as Verdict
 
     __version__: str
     methods: MethodNames
 
+# Where each public name is; the imports above say the same to type checkers.
 _HOME = {
     "plan": "planner.planning.methods.registry",
     "Plan": "planner.planning.job.plan",
@@ -89,31 +95,7 @@ VIEWS.update(
     card="planner.report.interactive.page:plan_card",
 )
 
-__all__ = [
-    "InputError",
-    "JointLimit",
-    "Machine",
-    "Method",
-    "NotSolvedError",
-    "PathLimit",
-    "Plan",
-    "PolynomialCorner",
-    "Program",
-    "Reading",
-    "Toolpath",
-    "Trace",
-    "Trajectory",
-    "Verdict",
-    "__version__",
-    "compare",
-    "load_machine",
-    "methods",
-    "path",
-    "plan",
-    "read_program",
-    "stretched",
-    "verify",
-]
+__all__ = ["__version__", *_HOME]
 
 
 def __getattr__(name: str) -> Any:

@@ -12,6 +12,7 @@ from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.geometry.nurbs import Nurbs
 from planner.machine import Machine
+from planner.motion.trajectory import Trajectory
 
 CURVES = json.loads(
     (Path(__file__).parents[1] / "benchmarks" / "solvers" / "curves.json").read_text(encoding="utf-8")
@@ -24,6 +25,14 @@ def curve_named(name: str) -> Nurbs:
         **{key: np.array(given_[key], float) for key in ("points", "knots", "weights")},
         degree=given_["degree"],
     )
+
+
+def chord_error(motion: Trajectory) -> float:
+    """The largest bow of a motion over a period [mm], |normal acceleration| dt^2 / 8."""
+    speed = np.maximum(np.linalg.norm(motion.velocity, axis=1), 1e-9)[:, None]
+    along = (motion.acceleration * motion.velocity).sum(axis=1, keepdims=True) / speed**2
+    across = np.linalg.norm(motion.acceleration - along * motion.velocity, axis=1)
+    return float(across[speed[:, 0] > 1e-6].max()) * motion.dt**2 / 8.0
 
 
 def circle(rho: float, normal: FloatArray = (0.0, 0.0, 1.0), turns: int = 1) -> Nurbs:

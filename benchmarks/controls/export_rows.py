@@ -29,9 +29,8 @@ from benchmarks.controls.export_judge import (
 from benchmarks.controls.export_programs import TOLERANCE, random_program
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.controls.export.candidates import AS_IT_IS, OWN_PATH, Candidate, Candidates
 from planner.controls.export.controls import CONTROLS
-from planner.controls.export.program import write_program
+from planner.controls.export.program import AS_IT_IS, OWN_PATH, Candidate, Candidates, write_program
 from planner.machine import Axis, Machine
 from planner.nc.program import Program
 from planner.nc.reading import AS_USUAL, Reading

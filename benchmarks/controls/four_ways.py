@@ -29,7 +29,7 @@ import numpy as np
 import planner
 from benchmarks.record import markdown, write_results
 from planner.controls.export.program import write_program
-from planner.controls.export.stream import write_stream
+from planner.controls.export.tables import write_stream
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 

@@ -83,21 +83,6 @@ def method_name(name: str) -> str:
     return known_name("method", METHOD_ALIASES.get(name, name), METHODS, METHOD_ALIASES)
 
 
-def solver_name(name: str) -> str:
-    """The name of a solver, as it is. Raises InputError for a name that no method has."""
-    return known_name("solver", name, SOLVERS)
-
-
-def geometry_name(name: str) -> str:
-    """The name of a geometry, as it is. Raises InputError for another name."""
-    return known_name("geometry", name, GEOMETRIES)
-
-
-def effort_name(name: str) -> str:
-    """The name of an effort, as it is. Raises InputError for another name."""
-    return known_name("effort", name, EFFORTS)
-
-
 def corner_name(name: str) -> str:
     """The name of a corner shape, or `auto` or `spline`, which are geometries and were corners in earlier
     versions. Raises InputError for another name."""
@@ -121,7 +106,7 @@ def smoothing(geometry: str | None, corner: str | None) -> tuple[str, str | None
     `spline` are taken as corners too. Raises InputError for unknown names, and for a corner shape beside
     splines.
     """
-    geometry = None if geometry is None else geometry_name(geometry)
+    geometry = None if geometry is None else known_name("geometry", geometry, GEOMETRIES)
     corner = None if corner is None else corner_name(corner)
     if corner in (AUTO, SPLINE):
         if geometry not in (None, corner):

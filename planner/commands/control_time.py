@@ -76,8 +76,7 @@ def _planned(
     import numpy as np
 
     from planner import plan
-    from planner.controls.export.candidates import LESS
-    from planner.controls.export.program import write_program
+    from planner.controls.export.program import LESS, write_program
     from planner.geometry.build import toolpath_from_program
 
     allowed = float(toolpath_from_program(program, machine, tolerance).tolerance.min())

@@ -109,8 +109,7 @@ def export_command(
     if for_ in PROGRAMS:
         _program(plan, for_, output, tolerance)
         return
-    from planner.controls.export.stream import write_stream
-    from planner.controls.export.tables import STRAIGHT, Table, laser_power, write_table
+    from planner.controls.export.tables import STRAIGHT, Table, laser_power, write_stream, write_table
     from planner.report.trajectory_reader import read_trajectory, trajectory_file
 
     with _new_directory(output) as new:
@@ -302,6 +301,6 @@ def report_command(
 
     file = output or directory / REPORT
     check_file(file, force=force)
-    plan, summary, text = saved_plan(directory)
-    write_whole(file, report_page(plan, text, summary, units))
+    plan, summary = saved_plan(directory)
+    write_whole(file, report_page(plan, summary, units))
     say(str(file))

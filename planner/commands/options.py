@@ -269,10 +269,10 @@ def takes_reading(command: Callable[..., None], *, caps: bool = True) -> Callabl
 # How a job is planned: what checks the name that an option takes, and the names that there are.
 _CHOICES: dict[str, tuple[Callable[[str], str], Iterable[str]]] = {
     "method": (names.method_name, names.METHODS),
-    "geometry": (names.geometry_name, names.GEOMETRIES),
+    "geometry": (functools.partial(names.known_name, "geometry", names=names.GEOMETRIES), names.GEOMETRIES),
     "corner": (names.corner_name, names.CORNER_SHAPES),
-    "solver": (names.solver_name, names.SOLVERS),
-    "effort": (names.effort_name, names.EFFORTS),
+    "solver": (functools.partial(names.known_name, "solver", names=names.SOLVERS), names.SOLVERS),
+    "effort": (functools.partial(names.known_name, "effort", names=names.EFFORTS), names.EFFORTS),
 }
 _HELP = {
     "method": f"how to plan: {', '.join(names.METHODS)}",

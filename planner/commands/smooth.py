@@ -109,7 +109,7 @@ def compared(program: Program, again: Program, machine: Machine, allowed: float)
     said = [[event.text for event in each.events] for each in (program, again)]
     marks = [_marks(each) for each in (program, again)]
     if said[0] != said[1] or len(marks[0]) != len(marks[1]):
-        return SamePath(within=float("inf"), runs=0, fault="words beside the motion differ")
+        return SamePath(within=float("inf"), fault="words beside the motion differ")
     return same_path(one, other, allowed, (marks[0], marks[1]))
 
 

@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from planner.base.errors import InputError
 from planner.motion.on_demand import TrajectoryOnDemand
-from planner.nc.points import are_points, is_points, own_text, points_file
-from planner.planning.job.at_tip import joints_of
+from planner.nc.points import are_points, is_points, points_file
 from planner.report.planned import LeftOut, planned_program
 from planner.report.replace import (
     CSV_METADATA,
@@ -34,8 +33,8 @@ from planner.report.replace import (
     replacing,
 )
 from planner.report.summary import json_ready, summary, tool_point_summary, versions
-from planner.report.trajectory_file import Format, units, write_trajectory
-from planner.report.word_feed import BlockWatch, PlannedBlocks, WordFeed
+from planner.report.trajectory_file import Format, PlanColumns, write_trajectory
+from planner.report.word_feed import BlockWatch, PlannedBlocks
 
 if TYPE_CHECKING:
     from planner.nc.program import Program
@@ -80,15 +79,14 @@ def write_plan(
         there = directory / name
         kept |= {name} if there.is_file() and there.read_bytes() == text and not is_ours(there) else set()
     with replacing(directory, kept=kept, force=force) as new:
-        about = trajectory_metadata(plan, run_id)
-        trajectory, blocks, joints = plan.trajectory, None, joints_of(plan)
-        file, feed_of = new / f"trajectory.{file_format}", WordFeed(plan.toolpath).of
+        about, columns = trajectory_metadata(plan, run_id), PlanColumns(plan)
+        trajectory, blocks, file = plan.trajectory, None, new / f"trajectory.{file_format}"
         if isinstance(trajectory, TrajectoryOnDemand):  # evaluated once for both files
             watch = BlockWatch(plan.toolpath)
-            write_trajectory(file, trajectory.heard_by(watch.take), about, joints, feed_of)
+            write_trajectory(file, trajectory.heard_by(watch.take), about, columns)
             blocks = watch.planned(trajectory)
         else:
-            write_trajectory(file, trajectory, about, joints, feed_of)
+            write_trajectory(file, trajectory, about, columns)
         program, notes = _planned(plan, directory, blocks)
         if program is not None:
             (new / PLANNED).write_bytes(program)
@@ -102,7 +100,7 @@ def write_plan(
         if report:
             from planner.report.html.page import REPORT, report_page
 
-            page = report_page(plan, own_text(plan.program), said, units)
+            page = report_page(plan, said, units)
             (new / REPORT).write_text(page, encoding="utf-8")
         sums = checksums(new)
         names = sorted([SUMMARY, *sums])
@@ -186,12 +184,7 @@ def trajectory_metadata(plan: Plan, run_id: str) -> dict[str, Any]:
             "tolerance_mm": plan.toolpath.same_tolerance,
             "reading": plan.program.reading.changed(),
             "not_limited": plan.verdict.not_limited if plan.verdict is not None else (),
-            "units": units(
-                trajectory.axes,
-                extruder=plan.toolpath.extrusion is not None,
-                tip=plan.joints is not None,
-                feed=WordFeed(plan.toolpath).units,
-            ),
+            "units": PlanColumns(plan).units,
             "tool_point": tool_point_summary(plan.program.tool_point),
             "machine": plan.machine.model_dump(mode="json", exclude_none=True),
             "versions": versions(),

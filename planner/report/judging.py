@@ -19,7 +19,7 @@ from planner.nc.feed_caps import read_feed_caps
 from planner.nc.program import Program
 from planner.nc.reading import AS_USUAL, Reading
 from planner.nc.set_limits import limited
-from planner.planning.job.at_tip import Judged, judged
+from planner.planning.job.at_tip import judged
 from planner.report.replace import FEED_CAPS
 from planner.report.trajectory_reader import TrajectoryFile
 from planner.verifier import NOT_LIMITED_NAMES, Verdict, fit_axes
@@ -58,15 +58,9 @@ def judge(
     if not len(toolpath):
         raise InputError("the program moves nothing: there is nothing to judge", source=program.source)
     motion, given, notes = fit_axes(read.trajectory, read.given, toolpath)
-    how = Judged(
-        program=program,
-        toolpath=toolpath,
-        machine=machine,
-        given=given,
-        not_limited=not_limited,
-        progress=progress,
+    verdict = judged(
+        motion, program, toolpath, machine, given=given, not_limited=not_limited, progress=progress
     )
-    verdict = judged(motion, how)
     return Judgement(motion=motion, toolpath=toolpath, machine=machine, verdict=verdict, notes=notes)
 
 

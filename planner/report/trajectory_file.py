@@ -33,19 +33,20 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
+from planner.base.arrays import Array
 from planner.base.errors import InputError
 from planner.base.sizes import SIZES
 from planner.machine import EXTRUDER, LINEAR_AXES, ROTARY_AXES
 from planner.motion.pulses import AxisPulses
 from planner.motion.trajectory import Trajectory, require_rest
+from planner.planning.job.at_tip import joints_of
+from planner.planning.job.plan import Plan
 from planner.report.replace import PULSES, replacing_file
 from planner.report.trajectory_reader import CSV_METADATA, FORMATS, PREFIXES, Format, read_trajectory
+from planner.report.word_feed import WordFeed
 
-__all__ = ["FORMATS", "Format", "read_trajectory", "units", "write_trajectory"]
+__all__ = ["FORMATS", "Format", "PlanColumns", "read_trajectory", "write_trajectory"]
 
-Joints = Callable[[Trajectory], Trajectory]
-Feeds = Callable[[Trajectory], FloatArray]
 PER = ("", "/s", "/s2", "/s3")  # of the units of columns with these prefixes
 TIP = "tip_"  # before the names of the columns of the tool's tip
 ROW_GROUP = SIZES.row_group
@@ -55,61 +56,8 @@ ROW_GROUP = SIZES.row_group
 PACKED: Any = {"compression": "zstd", "compression_level": 1}
 
 
-def write_trajectory(
-    path: str | Path,
-    trajectory: Trajectory,
-    about: dict[str, Any] | None = None,
-    joints_of: Joints | None = None,
-    feed_of: Feeds | None = None,
-) -> None:
-    """Write a trajectory in the format that the suffix names (.parquet, .csv, .npz), with `about` as its
-    metadata.
-
-    joints_of : the joints of a motion of the tip, of any of its samples; None where the trajectory is that of
-                the axes
-    feed_of   : the feed of any of its samples as F words mean it (word_feed.py); None for that along the path
-                in all axes
-
-    Raises InputError for another suffix.
-    """
-    path = Path(path)
-    text = json.dumps(about or {}, allow_nan=False)
-    match path.suffix:
-        case ".parquet":
-            with path.open("wb") as file:  # pyarrow takes no name that is not UTF-8, but an open file
-                _write_parquet(file, _groups(trajectory, joints_of, feed_of), text)
-        case ".csv":
-            _write_csv(path, _groups(trajectory, joints_of, feed_of))
-            path.with_suffix(CSV_METADATA).write_text(text + "\n", encoding="utf-8")
-        case ".npz":
-            columns = trajectory_columns(trajectory, joints_of, feed_of)
-            np.savez(path, metadata=np.array(text), allow_pickle=False, **columns)
-        case _:
-            raise ValueError(f"{path}: unknown format; there are {', '.join(FORMATS)}")
-
-
-def units(
-    axes: tuple[str, ...], *, extruder: bool = False, tip: bool = False, feed: str = "mm/s"
-) -> dict[str, str]:
-    """The unit of every column, by its name; `extruder`: there are columns of one; `tip`: there are those of
-    the tool's tip."""
-    said = {"t": "s"}
-    for axis in (*axes, EXTRUDER) if extruder else axes:
-        length = "deg" if axis in ROTARY_AXES else "mm"
-        said |= {prefix + axis: length + per for prefix, per in zip(PREFIXES, PER, strict=True)}
-    said |= {"s": "mm", "feed": feed, "line": "1", "block": "1"}
-    return said | ({TIP + axis: "mm" for axis in LINEAR_AXES} if tip else {})
-
-
-def trajectory_columns(
-    trajectory: Trajectory, joints_of: Joints | None = None, feed_of: Feeds | None = None
-) -> dict[str, Array]:
-    """The columns of a trajectory file by their names, each (T,); the rest as in `write_trajectory`."""
-    if feed_of is not None:
-        trajectory = dataclasses.replace(trajectory, feed=feed_of(trajectory))
-    if joints_of is not None:
-        tip = {TIP + axis: trajectory.position[:, trajectory.axes.index(axis)] for axis in LINEAR_AXES}
-        return trajectory_columns(joints_of(trajectory)) | tip
+def columns_of(trajectory: Trajectory) -> dict[str, Array]:
+    """The columns (T,) of samples by their names, those of an extruder too; the feed along the path in all axes."""
     columns: dict[str, Array] = {"t": trajectory.t}
     levels = (trajectory.position, trajectory.velocity, trajectory.acceleration, trajectory.jerk)
     for k, axis in enumerate(trajectory.axes):
@@ -120,14 +68,59 @@ def trajectory_columns(
     return columns | {name: getattr(trajectory, name) for name in ("s", "feed", "line", "block")}
 
 
-def _groups(
-    trajectory: Trajectory, joints_of: Joints | None, feed_of: Feeds | None
-) -> Iterator[dict[str, Array]]:
+Columns = Callable[[Trajectory], dict[str, Array]]
+
+
+class PlanColumns:
+    """The columns of any samples of a plan's trajectory: the feed as F words mean it, and with the tool centre point on
+    those of the joints, with the tip beside them; `units` has the unit of each by its name."""
+
+    def __init__(self, plan: Plan):
+        self._word, self._joints = WordFeed(plan.toolpath), joints_of(plan)
+        said = {"t": "s"}
+        for axis in (*plan.toolpath.axes, *[EXTRUDER] * (plan.toolpath.extrusion is not None)):
+            length = "deg" if axis in ROTARY_AXES else "mm"
+            said |= {prefix + axis: length + per for prefix, per in zip(PREFIXES, PER, strict=True)}
+        said |= {"s": "mm", "feed": self._word.units, "line": "1", "block": "1"}
+        self.units = said | ({TIP + axis: "mm" for axis in LINEAR_AXES} if self._joints else {})
+
+    def __call__(self, samples: Trajectory) -> dict[str, Array]:
+        samples = dataclasses.replace(samples, feed=self._word.of(samples))
+        if self._joints is None:
+            return columns_of(samples)
+        tip = {TIP + axis: samples.position[:, samples.axes.index(axis)] for axis in LINEAR_AXES}
+        return columns_of(self._joints(samples)) | tip
+
+
+def write_trajectory(
+    path: str | Path,
+    trajectory: Trajectory,
+    about: dict[str, Any] | None = None,
+    columns: Columns = columns_of,
+) -> None:
+    """Write a trajectory in the format that the suffix names (.parquet, .csv, .npz), with `about` as its
+    metadata and the `columns` of any of its samples. Raises ValueError for another suffix."""
+    path = Path(path)
+    text = json.dumps(about or {}, allow_nan=False)
+    match path.suffix:
+        case ".parquet":
+            with path.open("wb") as file:  # pyarrow takes no name that is not UTF-8, but an open file
+                _write_parquet(file, _groups(trajectory, columns), text)
+        case ".csv":
+            _write_csv(path, _groups(trajectory, columns))
+            path.with_suffix(CSV_METADATA).write_text(text + "\n", encoding="utf-8")
+        case ".npz":
+            np.savez(path, metadata=np.array(text), allow_pickle=False, **columns(trajectory))
+        case _:
+            raise ValueError(f"{path}: unknown format; there are {', '.join(FORMATS)}")
+
+
+def _groups(trajectory: Trajectory, columns_of_samples: Columns) -> Iterator[dict[str, Array]]:
     """The columns of `ROW_GROUP` samples at a time."""
     parts: list[dict[str, Array]] = []
     count = 0
     for chunk in trajectory.chunks():
-        columns, done = trajectory_columns(chunk, joints_of, feed_of), 0
+        columns, done = columns_of_samples(chunk), 0
         while done < len(chunk):
             new = min(ROW_GROUP - count, len(chunk) - done)
             parts.append({name: column[done : done + new] for name, column in columns.items()})

@@ -113,7 +113,7 @@ def after_filters(
     check = apart.contour_check(toolpath)
     faults = [check.fault(Kind.FILTERS, toolpath.axes)] if check.broken else []
     faults += apart.vertex_faults(toolpath)
-    faults += findings.unvisited(readings, toolpath, pieces)[2]
+    faults += findings.unvisited(readings, toolpath, pieces)[1]
     faults = faults or findings.out_of_order(readings, toolpath, pieces)
     return AfterFilters(
         contour=check,
@@ -134,9 +134,9 @@ def after_filters(
 CHORD_BOW, CUBIC_BOW = 1.0 / 8.0, 1.0 / 32.0
 
 
-def bow_share(machine: Machine | None = None) -> float:
-    """The bow between setpoints over a h^2 [-]; of chords without a machine."""
-    return CUBIC_BOW if machine is not None and machine.interpolation == "cubic" else CHORD_BOW
+def bow_share(machine: Machine) -> float:
+    """The bow between setpoints over a h^2 [-]."""
+    return CUBIC_BOW if machine.interpolation == "cubic" else CHORD_BOW
 
 
 class Signal:

@@ -10,7 +10,7 @@ from planner.geometry.toolpath import Toolpath
 from planner.motion.trajectory import in_degrees
 from planner.verifier import limits as rows
 from planner.verifier.excess import FAULTS_OF_A_KIND, Excess, Fault, Kind, first_of, of_check, placed
-from planner.verifier.matching import HELD, JUMPS, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
+from planner.verifier.matching import HELD, LAST, LOST_AFTER, NOT_LOST, STUCK_AT
 from planner.verifier.pieces import CONTOUR_ROUNDING, RATIO_ROUNDING, ProgramPieces
 from planner.verifier.stream import Observed
 from planner.verifier.verdict import LimitCheck
@@ -112,12 +112,6 @@ def column_faults(
     return said
 
 
-def largest_chord_error(readings: list[Observed]) -> float:
-    """Largest bow over one delivered period [mm]."""
-    worst = readings[0].worst
-    return float(worst.row[rows.GROUPS * worst.at.shape[1] + rows.CHORD, 1])
-
-
 # ---- ends, order, stops
 
 
@@ -144,19 +138,18 @@ def end_error(
 
 def unvisited(
     readings: list[Observed], toolpath: Toolpath, pieces: ProgramPieces
-) -> tuple[Array, bool, list[Fault]]:
-    """Segments (k,) that are never visited, whether the rest is run in order, and what is wrong with it."""
-    lost = np.zeros(len(pieces.piece["segment"]), dtype=np.bool_)
-    in_order, said = True, []
+) -> tuple[bool, list[Fault]]:
+    """Whether every segment is visited, and faults of blocks that are left out or not followed."""
+    complete, said = True, []
     end_within = pieces.joint["budget"][-1] * (1.0 + RATIO_ROUNDING) + CONTOUR_ROUNDING
     for reading in readings:
         match = reading.match
         left_out = match.track["lost"].copy()
         left_out[match.tally[LAST] + 1 :] = True
         left_out[-1] |= not match.passed["near"][-1] <= end_within
-        lost |= left_out
         here = np.unique(pieces.piece["segment"][left_out])
         if len(here):
+            complete = False
             lines = list(dict.fromkeys(toolpath.line[here].tolist()))
             shown = ", ".join(map(str, lines[:FAULTS_OF_A_KIND])) + " ..." * (len(lines) > FAULTS_OF_A_KIND)
             left = f"{len(here)} blocks are not run to their end, line {shown}"
@@ -165,8 +158,7 @@ def unvisited(
             line = line_of(toolpath, pieces, int(match.tally[LOST_AFTER]))
             held = f"lost after line {line}: {match.tally[HELD]} places looked at are far from where the program should be"
             said.append(_order(reading.noted(held), line))
-        in_order = in_order and not match.tally[JUMPS] and not match.tally[HELD] and not len(here)
-    return np.unique(pieces.piece["segment"][lost]), in_order, said
+    return complete, said
 
 
 def _order(found: str, line: int) -> Fault:

@@ -13,7 +13,7 @@ from planner.verifier.claims import claims_of
 from planner.verifier.exact import exact_faults
 from planner.verifier.excess import Kind
 from planner.verifier.extruder import extruder_seen
-from planner.verifier.filtered import after_filters, bow_share
+from planner.verifier.filtered import after_filters
 from planner.verifier.given import DERIVATIVES, WHOLE, Given
 from planner.verifier.limits import NORMAL_NAME, limits_of
 from planner.verifier.pieces import program_pieces, widened
@@ -69,11 +69,10 @@ def verify(
     checks = findings.limit_checks(readings, toolpath, pieces, not_limited)
     contour_check = apart.contour_check(toolpath)
     end_error, end_faults = findings.end_error(readings, toolpath, limits.rounding)
-    lost, order, order_faults = findings.unvisited(readings, toolpath, pieces)
+    complete, order_faults = findings.unvisited(readings, toolpath, pieces)
     vertex_faults = apart.vertex_faults(toolpath)
     if not (contour_check.broken or vertex_faults or order_faults):
         order_faults = findings.out_of_order(readings, toolpath, pieces)
-        order = not order_faults
     coarse, notes = samples.digits(trajectory, limits, given, not_limited)
     if motion is None:
         seen = max(contour_error or 0.0, vertex_error or 0.0)
@@ -135,11 +134,7 @@ def verify(
         angle_error_deg=angle_error,
         vertex_error_mm=vertex_error,
         end_error_mm=end_error,
-        chord_error_mm=bow_share(machine) / bow_share() * findings.largest_chord_error(readings),
-        order=order,
-        lost=tuple(int(toolpath.block[k]) for k in lost),
-        lost_lines=tuple(dict.fromkeys(int(toolpath.line[k]) for k in lost)),
-        lost_after=contour.lost_after(readings, toolpath, pieces, complete=not len(lost)),
+        lost_after=contour.lost_after(readings, toolpath, pieces, complete=complete),
         threads=threads,
         faults=faults,
         ringing=ringing_of(trajectory, machine),

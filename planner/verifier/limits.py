@@ -12,11 +12,10 @@ jerk acceleration may jump within every period, and the acceleration column cann
 jerk column, which may jump anyhow.
 
 The row of the feed, |v| over all axes with rotary ones at the radius of the path, is of feed.py. Normal
-acceleration is |a - (a.t) t| with t = v/|v| over x, y and z; its share of the chord error over a period is
-|normal acceleration| h^2 / 8. Where velocity or acceleration was not delivered it is taken from the second
-difference, a mean of a(t) over w = t2 - t0, across the chord's direction u. With normal acceleration <= N,
-|a| <= A and speed >= v the motion's direction turns by at most N w / v in that time, and u lies within its turn,
-so that of the mean
+acceleration is |a - (a.t) t| with t = v/|v| over x, y and z. Where velocity or acceleration was not delivered it
+is taken from the second difference, a mean of a(t) over w = t2 - t0, across the chord's direction u. With normal
+acceleration <= N, |a| <= A and speed >= v the motion's direction turns by at most N w / v in that time, and u lies
+within its turn, so that of the mean
 
     |a - (a.u) u| <= N + A sin(min(N w / v, pi/2)),      v = chord / w - A w,
 
@@ -53,8 +52,8 @@ PER_MM2 = 1e-6  # m2 in a mm2: 1 mm2/s3 is 1e-6 W/kg, of rotary axes W/(kg m2) a
 # Rows of `Worst`: six groups of one row per axis, then some of their own, then the power of each axis, and three per user limit.
 VELOCITY, ACCELERATION, JERK, GAP_BY_ACCELERATION, GAP_BY_JERK, GAP_OF_ACCELERATION = range(6)
 GROUPS = 6
-FEED, NORMAL, CHORD, TANGENTIAL = range(4)  # the last of two rows: acceleration, jerk
-ROWS_ALONE = 5
+FEED, NORMAL, TANGENTIAL = range(3)  # the last of two rows: acceleration, jerk
+ROWS_ALONE = 4
 OF_NORMAL = NAMES.index(NORMAL_NAME)
 
 
@@ -97,7 +96,7 @@ def normal_limit(machine: Machine) -> float:
 
 
 def rows_of(limits: Limits) -> list[tuple[str, str]]:
-    """Name and unit of every row that is looked at; the gaps and the chord error have no name."""
+    """Name and unit of every row that is looked at; the gaps have no name."""
     unit = ["deg" if letter in ROTARY_AXES else "mm" for letter in limits.axes]
     rows = [
         (f"{quantity}.{letter}", length + per)
@@ -105,7 +104,7 @@ def rows_of(limits: Limits) -> list[tuple[str, str]]:
         for letter, length in zip(limits.axes, unit, strict=True)
     ]
     rows += [("", "")] * (GROUPS * len(limits.axes) - len(rows))
-    rows += [("feed", "mm/s"), (NORMAL_NAME, "mm/s2"), ("", "mm")]
+    rows += [("feed", "mm/s"), (NORMAL_NAME, "mm/s2")]
     rows += zip(TANGENTIAL_NAMES, ("mm/s2", "mm/s3"), strict=True)
     rows += [
         (f"power.{letter}" if np.isfinite(most) else "", "W/kg" if length == "mm" else "W/(kg m2)")
@@ -158,8 +157,6 @@ def look_at_axes(
     second = differences(block.t, block.position, position_error(block, limits))[1]
     normal, taken_off = _mean_normal(block, limits, *second)
     worst.take(alone + NORMAL, (normal - taken_off)[:, None], limits.normal, DIFFERENCE, block)
-    period = np.diff(block.t, prepend=block.t[:1])
-    worst.take(alone + CHORD, (normal * period * period / 8.0)[:, None], 1.0, DIFFERENCE, block)
     return float(travelled)
 
 
@@ -243,9 +240,7 @@ def _look(t, state, widest, piece, skip, travelled, allowed, sure, work, found, 
             for i in range(axes):
                 if linear[i]:
                     across += (state[k, 2, i] - along / speed_sq * state[k, 1, i]) ** 2
-            normal, bow = np.sqrt(across), h if k else 0.0
-            _keep(found, most, OF_NORMAL, GROUPS * axes + NORMAL, normal, normal_max, COLUMN, here)
-            _keep(found, most, none, GROUPS * axes + CHORD, normal * bow * bow / 8.0, 1.0, COLUMN, here)
+            _keep(found, most, OF_NORMAL, GROUPS * axes + NORMAL, np.sqrt(across), normal_max, COLUMN, here)
     return travelled + run
 
 

@@ -29,8 +29,7 @@ class SamePath:
     """What was found."""
 
     within: float  # a bound of the distance of the paths, both ways and in order [mm]; inf where `fault` is not ""
-    runs: int
-    fault: str  # "" if the paths are within the allowed distance and all else is the same
+    fault: str = ""  # "" if the paths are within the allowed distance and all else is the same
     line: int = 0  # of the second program, where the fault is
 
 
@@ -55,21 +54,20 @@ def same_path(
         raise ValueError(f"axes {one.axes} and {other.axes}")
     none = np.zeros(0, dtype=np.int64)
     mine, theirs = (_runs(p, m) for p, m in zip((one, other), marks or (none, none), strict=True))
-    count = len(mine.mode)
     fault, line = _difference(one, mine, other, theirs)
+    if fault:
+        return SamePath(within=math.inf, fault=fault, line=line)
     flat, found = FLAT * allowed, 0.0
     room = allowed - 2.0 * flat
-    for k in range(0 if fault else count):
+    for k in range(len(mine.mode)):
         a, b = _chords(one, mine, k, flat), _chords(other, theirs, k, flat)
         if mine.mode[k, -1] or np.array_equal(a, b):
             continue
         found = _least(a, b, found, room, FINE * allowed)
         if found == math.inf:
-            fault, line = "the paths are further apart", int(other.line[theirs.first[k]])
-            break
-    if fault:
-        return SamePath(within=math.inf, runs=count, fault=fault, line=line)
-    return SamePath(within=found + 2.0 * flat if found else 0.0, runs=count, fault="")
+            line = int(other.line[theirs.first[k]])
+            return SamePath(within=math.inf, fault="the paths are further apart", line=line)
+    return SamePath(within=found + 2.0 * flat if found else 0.0)
 
 
 def _runs(path: Toolpath, marks: Array) -> _Runs:

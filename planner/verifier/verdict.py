@@ -44,10 +44,6 @@ class LimitCheck:
         """True if the quantity is limited and exceeds its limit."""
         return self.limited and self.ratio > 1.0 + RATIO_ROUNDING
 
-    def sentence(self, axes: tuple[str, ...]) -> str:
-        """Value, ratio, limit, time, place: "velocity.x: 101 mm/s, 1.01 of the limit 100 mm/s at ..."."""
-        return self.fault(Kind.LIMIT, axes).sentence
-
     def fault(self, kind: Kind, axes: tuple[str, ...]) -> Fault:
         """The fault where the limit does not hold."""
         where = placed(axes, self.position)
@@ -117,10 +113,6 @@ class Verdict:
     vertex_error_mm  : largest distance of a programmed vertex from the motion [mm]; None if one is not known
     lost_after       : NC line of the last block along which the motion could be followed; None if all
     end_error_mm     : distance of the first or the last sample from the program's ends, the larger [mm]
-    chord_error_mm   : largest |normal acceleration| dt^2 / 8 over a period [mm]; part of the contour error
-    order            : True if the blocks are passed in the order of the program, and none is left out
-    lost             : indices of blocks that the motion never visits
-    lost_lines       : their NC lines
     threads          : moves in step with the spindle, in order, each with how far it is out of step
     faults           : each failure: what, by how much, when, where, NC line; `str` of one is its sentence
     excesses         : spans of time in which limits or the tolerance are exceeded, as far as known
@@ -138,10 +130,6 @@ class Verdict:
     contour_error_mm: float | None
     vertex_error_mm: float | None
     end_error_mm: float
-    chord_error_mm: float
-    order: bool
-    lost: tuple[int, ...]
-    lost_lines: tuple[int, ...]
     faults: tuple[Fault, ...]
     excesses: tuple[Excess, ...] = ()
     linear_error_mm: float | None = None

@@ -90,7 +90,7 @@ def test_verify_judges_the_joints_and_the_tip(made: Path) -> None:
 
 @pytest.mark.slow
 def test_the_plan_again_from_its_files(made: Path) -> None:
-    plan, summary, _ = saved_plan(made / "out")
+    plan, summary = saved_plan(made / "out")
     assert plan.verdict is not None
     assert plan.verdict.passed == summary["verdict"]["passed"]
     with np.load(made / "out" / "trajectory.npz") as file:
@@ -100,7 +100,7 @@ def test_the_plan_again_from_its_files(made: Path) -> None:
 
 @pytest.mark.slow
 def test_planned_program_is_that_of_the_tip_with_block_times_under_g93(made: Path) -> None:
-    plan, _, _ = saved_plan(made / "out")
+    plan, _ = saved_plan(made / "out")
     program = read_program(made / "out" / "planned.ngc", plan.machine)
     assert program.tool_point == plan.program.tool_point
     again = toolpath_from_program(program, plan.machine)
@@ -134,7 +134,7 @@ def test_info_tells_it(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_picture_has_the_tool(made: Path) -> None:
-    plan, _, _ = saved_plan(made / "out")
+    plan, _ = saved_plan(made / "out")
     figure = toolpath_figure(plan, UNITS["mm"])
     labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     assert "tool" in labels

@@ -7,8 +7,7 @@ from typer.testing import CliRunner
 import planner
 from planner.commands.app import app
 from planner.controls.export.program import write_program
-from planner.controls.export.stream import write_stream
-from planner.controls.export.tables import Table, write_table
+from planner.controls.export.tables import Table, write_stream, write_table
 from planner.motion.pulses import pulses_of
 from planner.report.trajectory_file import write_pulses
 

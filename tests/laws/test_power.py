@@ -8,7 +8,6 @@ import pytest
 import planner
 from planner.base.errors import InputError
 from planner.machine import Machine
-from planner.nc.points import own_text
 from planner.planning.job.plan import Plan
 from planner.report.brief import brief_rows
 from planner.report.html.page import report_page
@@ -92,5 +91,5 @@ def test_a_plan_says_where_drive_power_holds_it() -> None:
     assert "drive power of X" in rows["limited by"]
     assert rows["saved"].startswith("not known"), "no stop at every block keeps the power"
     assert dict(brief_rows(free, UNITS["mm"]))["saved"][0].isdigit()
-    page = report_page(plan, own_text(plan.program), summary(plan))
+    page = report_page(plan, summary(plan))
     assert "power.x" in page

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from hand_made import make_plan
 
+import planner
 from planner.base.errors import InputError
 from planner.motion.trajectory import Trajectory
 from planner.report.trajectory_file import (
     FORMATS,
+    PlanColumns,
     read_trajectory,
-    units,
     write_trajectory,
 )
 from planner.report.trajectory_reader import VALUE_MAX, divided_difference
@@ -28,7 +29,7 @@ FIELDS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "blo
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_round_trip_is_exact(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"trajectory.{suffix}"
-    about = {"run_id": "abc", "machine": {"name": "m"}, "units": units(TRAJECTORY.axes)}
+    about = {"run_id": "abc", "machine": {"name": "m"}, "units": PlanColumns(make_plan()).units}
     write_trajectory(path, TRAJECTORY, about)
     read = read_trajectory(path)
     assert read.metadata == about
@@ -66,8 +67,13 @@ def test_csv_is_plain(tmp_path: Path) -> None:
 
 
 def test_rotary_columns_are_in_radians() -> None:
-    assert units(("x", "a"))["va"] == "deg/s"
-    assert units(("x", "a"))["jx"] == "mm/s3"
+    machine = planner.load_machine("mill")
+    machine = machine.model_copy(update={"axes": {**machine.axes, "a": machine.axes["x"]}})
+    plan = planner.plan(
+        planner.read_program(text="G1 X10 A5 F1000\n", machine=machine), machine, method="stop"
+    )
+    units = PlanColumns(plan).units
+    assert (units["va"], units["jx"]) == ("deg/s", "mm/s3")
 
 
 def test_positions_are_enough(tmp_path: Path) -> None:

@@ -161,7 +161,7 @@ def test_the_judge_finds_the_chord_error_used_up(fir):
     grid = on_grid(toolpath, machine)
     verdict = judge(steady(capped(limit, grid)), toolpath, machine)
     allowed = grid.sides()[0].tol_chord[1]
-    assert verdict.chord_error_mm == pytest.approx(allowed, rel=CLOSE)
+    assert verdict.contour_error_mm == pytest.approx(allowed, rel=CLOSE)  # of a motion on the path
     assert (allowed < 0.1 * machine.tolerance) == (fir is not None)  # the filters have the larger part
 
 

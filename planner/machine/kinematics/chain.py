@@ -23,11 +23,15 @@ LinuxCNC's positive direction turns it right-handed, so the tool's direction, se
 
 always with u_z = cos(tilt): the pole, where c has no influence on the direction, is u = +-e_z. `reversed`
 axes turn the other way.
+
+A path gives position and derivatives of all its axes, p(s) and the angles; q(s) = f(p(s)) then has the
+derivatives that the chain rule gives to third order (base/series.py), exact but for rounding.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -35,7 +39,8 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.machine import Machine
+from planner.base.series import Series
+from planner.machine import ROTARY_AXES, Machine
 from planner.machine.parts import HEAD_HEAD, HEAD_TABLE, KinematicsData
 
 LINEAR = ("x", "y", "z")
@@ -176,3 +181,31 @@ def _sum(v: Vector, w: Vector) -> Vector:
 
 def _less(v: Vector, w: Vector) -> Vector:
     return v[0] - w[0], v[1] - w[1], v[2] - w[2]
+
+
+def along(
+    carried: Callable[[dict[str, Any]], dict[str, Any]],
+    axes: tuple[str, ...],
+    motion: FloatArray,
+    radius: float = 1.0,
+) -> FloatArray:
+    """(4, n, A) what is `carried`, `Kinematics.joints` or `Chain.point`, rotary axes as they are, and its first three
+    derivatives with respect to what those of `motion` (4, n, A) are with respect to: path length or time.
+
+    radius : at which the angles of rotary axes are lengths [mm]; at 1 mm they are in rad
+    """
+    table = np.asarray(motion, dtype=np.float64)
+    columns = {letter: Series(table[:, :, k]) for k, letter in enumerate(axes)}
+    found = carried(in_rad(columns, radius))
+    out = table.copy()
+    for k, letter in enumerate(axes):
+        if letter in LINEAR:
+            out[:, :, k] = found[letter].derivatives
+    return out
+
+
+def in_rad(columns: dict[str, Any], radius: float) -> dict[str, Any]:
+    """Columns by the letters of axes with rotary ones in rad instead of lengths at a radius [mm]."""
+    if radius == 1.0:
+        return columns
+    return {letter: c * (1.0 / radius) if letter in ROTARY_AXES else c for letter, c in columns.items()}

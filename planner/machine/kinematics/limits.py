@@ -15,8 +15,7 @@ import numpy as np
 
 from planner.base.errors import InputError
 from planner.machine import Axis, Machine
-from planner.machine.kinematics.along_path import in_rad
-from planner.machine.kinematics.chain import LINEAR, Kinematics, kinematics_of
+from planner.machine.kinematics.chain import LINEAR, Kinematics, in_rad, kinematics_of
 from planner.machine.user_limit import QUANTITIES, JointLimit, Place
 
 # Limits of the tip's coordinates: so many times the largest of the linear joints [-]. Splines are shaped by

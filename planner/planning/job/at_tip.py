@@ -9,7 +9,6 @@ contour error.
 import dataclasses
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from planner.geometry.chords import points_on
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
 from planner.machine.kinematics import Chain, kinematics_of
-from planner.machine.kinematics.along_path import in_rad
+from planner.machine.kinematics.chain import in_rad
 from planner.machine.kinematics.limits import LinearJoint
 from planner.motion.chain_setpoints import joint_setpoints
 from planner.motion.trajectory import Trajectory
@@ -31,19 +30,6 @@ from planner.verifier import WHOLE, Given, Verdict, verify, verify_joints
 LOOKED_AT = 4
 # Share of the tolerance that is left free for it at most [-]: with more the motion has to be slower, and the verdict says so.
 LEFT_FREE_MOST = 0.5
-
-
-@dataclass(frozen=True, kw_only=True)
-class Judged:
-    """The verifier's view of delivered setpoints."""
-
-    # program, toolpath and machine: as `verify` has them
-    program: Program
-    toolpath: Toolpath
-    machine: Machine
-    given: Given = WHOLE  # which columns were delivered, and with how many digits
-    not_limited: tuple[str, ...] = ()  # quantities that are reported and not judged
-    progress: Callable[[float], None] | None = None  # called now and then with the fraction done (0 to 1)
 
 
 def chain_of(program: Program, machine: Machine) -> Chain | None:
@@ -117,17 +103,23 @@ def directions_of(plan: Plan, samples: Trajectory) -> FloatArray | None:
     return np.stack(np.broadcast_arrays(*chain.direction(in_rad(columns, samples.radius))), axis=1)
 
 
-def judged(setpoints: Trajectory, job: Judged) -> Verdict:
-    """The verdict on setpoints of the axes: in the joints and at the tip with the tool centre point on.
-
-    Raises InputError as `verify` does.
-    """
-    chain = chain_of(job.program, job.machine)
-    free = (*job.not_limited, *job.program.reading.unjudged)
-    how = {"given": job.given, "not_limited": free, "progress": job.progress}
+def judged(
+    setpoints: Trajectory,
+    program: Program,
+    toolpath: Toolpath,
+    machine: Machine,
+    *,
+    given: Given = WHOLE,
+    not_limited: tuple[str, ...] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Verdict:
+    """The verdict on setpoints of the axes, in the joints and at the tip with the tool centre point on; the rest as of
+    `verify`."""
+    chain, free = chain_of(program, machine), (*not_limited, *program.reading.unjudged)
+    how: dict[str, Any] = {"given": given, "not_limited": free, "progress": progress}
     if chain is None:
-        return verify(setpoints, job.toolpath, job.machine, **how)  # type: ignore[arg-type]
-    return verify_joints(setpoints, job.toolpath, job.machine, tool_length=chain.length, **how)  # type: ignore[arg-type]
+        return verify(setpoints, toolpath, machine, **how)
+    return verify_joints(setpoints, toolpath, machine, tool_length=chain.length, **how)
 
 
 def in_joints(plan: Plan, machine: Machine, chain: Chain) -> Plan:

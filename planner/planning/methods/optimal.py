@@ -6,7 +6,7 @@ Corners are rounded, tangent joints with a jump of the curvature too: a jump wou
 import dataclasses
 from dataclasses import dataclass
 
-from planner.base.names import AUTO, NORMAL, effort_name
+from planner.base.names import AUTO, NORMAL, known_name
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solvers import OWN, ThirdOrderSolver, third_order_solver
@@ -54,7 +54,7 @@ class OptimalMethod(Method):
         return self.corner == AUTO and self.solver == OWN
 
     def plan_job(self, job: Job) -> Plan:
-        effort = EFFORTS[effort_name(self.effort)]
+        effort = EFFORTS[known_name("effort", self.effort, EFFORTS)]
         search = dataclasses.replace(effort.search, smooth=0.0 if self.shaped else self.smooth)
         settings = Settings(
             method="optimal",

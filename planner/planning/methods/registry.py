@@ -11,15 +11,7 @@ from typing import Any, TypedDict, Unpack, cast
 import numpy as np
 
 from planner.base.errors import InputError
-from planner.base.names import (
-    BEZIER,
-    METHODS,
-    effort_name,
-    method_name,
-    smoothing,
-    solver_name,
-    users_of,
-)
+from planner.base.names import BEZIER, EFFORTS, METHODS, SOLVERS, known_name, method_name, smoothing, users_of
 from planner.corners.smooth import CornerShape
 from planner.machine import LINEAR_AXES, Machine, load_machine
 from planner.machine.kinematics import at_tip
@@ -143,11 +135,11 @@ def make_method(name: str, **settings: Unpack[MethodSettings]) -> Method:
         kind, shape = _smoothing(given.get("geometry"), given.get("corner"))
         made |= {"corner": shape or kind, "shaped": bool(given.get("shaped"))}
         if (effort := given.get("effort")) is not None:
-            made["effort"] = effort_name(effort)
+            made["effort"] = known_name("effort", effort, EFFORTS)
     if (smooth := given.get("smooth")) is not None:
         made["smooth"] = float(smooth)
     if entry.solvers and (solver := given.get("solver")) is not None:
-        made["solver"] = solver_name(solver)
+        made["solver"] = known_name("solver", solver, SOLVERS)
     module, _, class_name = entry.home.partition(":")
     method = getattr(import_module(module), class_name)(**made)
     assert isinstance(method, Method)

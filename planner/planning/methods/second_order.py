@@ -7,7 +7,7 @@ points. The verdict reports the jerk as not limited.
 
 from dataclasses import dataclass
 
-from planner.base.names import AUTO, NORMAL, effort_name
+from planner.base.names import AUTO, NORMAL, known_name
 from planner.corners.smooth import CornerShape
 from planner.feedrate.solution import FeedrateSolver
 from planner.feedrate.solvers import REACHABILITY, second_order_solver
@@ -39,7 +39,7 @@ class SecondOrderMethod(Method):
 
     def plan_job(self, job: Job) -> Plan:
         order = SecondOrder(second_order_solver(self.solver), to_tighten=self.shaped)
-        effort = EFFORTS[effort_name(self.effort)]
+        effort = EFFORTS[known_name("effort", self.effort, EFFORTS)]
         settings = Settings(
             method="second-order",
             corner=self.corner,

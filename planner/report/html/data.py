@@ -57,32 +57,6 @@ class Samples:
     parts: dict[str, tuple[list[str], Array]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Lines:
-    """L NC lines that move, in the order of the motion.
-
-    line       : (L,) number
-    planned    : (L,) time of the motion [s], dwells not included
-    programmed : (L,) time at the programmed feed without any acceleration [s]; NaN for rapids
-    highest    : (L,) highest feed of the samples shown, or what is known of lines without one [mm/s]
-    limit      : (L,) index in `Samples.limits` of the limit that holds the motion there for the longest time
-    deviation  : (L,) largest distance of the samples shown from the programmed path [mm]; NaN where no sample
-                 is shown
-    more_feed  : (L,) time that a tenth more of this line's feed would save [s]; None where it is not known
-    more       : (L,) time that a tenth more of all limits on this line would save [s]; None where it is not
-                 known
-    """
-
-    line: Array
-    planned: FloatArray
-    programmed: FloatArray
-    highest: FloatArray
-    limit: Array
-    deviation: FloatArray
-    more_feed: FloatArray | None
-    more: FloatArray | None
-
-
 def samples_of(plan: Plan, most: int = SAMPLES_MAX) -> Samples:
     """The samples that a report shows. The plan must have a trajectory."""
     trajectory = plan.trajectory
@@ -181,32 +155,42 @@ def used_limits(names: tuple[str, ...], index: Array) -> tuple[tuple[str, ...], 
     return (found if NO_LIMIT in found else (*found, NO_LIMIT)), place[index]
 
 
-def lines_of(plan: Plan, samples: Samples) -> Lines:
-    """The NC lines of a plan that move."""
+def lines_of(plan: Plan, samples: Samples) -> dict[str, Array]:
+    """The L NC lines of a plan that move, in the order of the motion, in columns (L,):
+
+    line       : number
+    planned    : time of the motion [s], dwells not included
+    programmed : time at the programmed feed without any acceleration [s]; NaN for rapids
+    highest    : highest feed of the samples shown, or what is known of lines without one [mm/s]
+    limit      : index in `Samples.limits` of the limit that holds the motion there for the longest time
+    deviation  : largest distance of the samples shown from the programmed path [mm]; NaN where no sample is shown
+    more_feed  : time that a tenth more of this line's feed would save [s], where it is known
+    more       : time that a tenth more of all limits on this line would save [s], where it is known
+    """
     toolpath, trajectory = plan.toolpath, plan.trajectory
     assert trajectory is not None
     blocks = planned_blocks(trajectory, toolpath)
     fresh = np.append(True, np.diff(toolpath.line) != 0)
     row = np.cumsum(fresh) - 1  # of each segment
     rows = int(row[-1]) + 1 if len(row) else 0
-    programmed = np.where(toolpath.rapid, np.nan, toolpath.length / toolpath.feed)
     at = row[toolpath.segment_at(samples.shown.block)]
-    highest, unseen = np.full(rows, -1.0), np.zeros(rows)
+    highest, unseen, deviation = np.full(rows, -1.0), np.zeros(rows), np.full(rows, -1.0)
     np.maximum.at(highest, at, samples.feed)
     np.maximum.at(unseen, row, WordFeed(toolpath).of_segments(blocks.highest))
-    deviation = np.full(rows, -1.0)
     np.maximum.at(deviation, at, samples.deviation)
-    places = plan.prices.places if plan.prices is not None else None
-    return Lines(
-        more_feed=None if places is None else np.bincount(row, places.feed, rows).astype(np.float64),
-        more=None if places is None else np.bincount(row, places.limits, rows).astype(np.float64),
-        line=toolpath.line[fresh],
-        planned=np.bincount(row, blocks.duration, rows).astype(np.float64),
-        programmed=np.bincount(row, programmed, rows).astype(np.float64),
-        highest=np.where(highest < 0.0, unseen, highest),
-        limit=_longest(at, samples, rows),
-        deviation=np.where(deviation < 0.0, np.nan, deviation),
-    )
+    programmed = np.where(toolpath.rapid, np.nan, toolpath.length / toolpath.feed)
+    columns: dict[str, Array] = {
+        "line": toolpath.line[fresh],
+        "planned": np.bincount(row, blocks.duration, rows).astype(np.float64),
+        "programmed": np.bincount(row, programmed, rows).astype(np.float64),
+        "highest": np.where(highest < 0.0, unseen, highest),
+        "limit": _longest(at, samples, rows),
+        "deviation": np.where(deviation < 0.0, np.nan, deviation),
+    }
+    if plan.prices is not None and (places := plan.prices.places) is not None:
+        for name, saved in (("more_feed", places.feed), ("more", places.limits)):
+            columns[name] = np.bincount(row, saved, rows).astype(np.float64)
+    return columns
 
 
 def _longest(at: Array, samples: Samples, rows: int) -> Array:

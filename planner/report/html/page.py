@@ -15,6 +15,7 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
+from planner.nc.points import own_text
 from planner.nc.program import Kind
 from planner.report.figure import (
     AGAINST,
@@ -47,13 +48,10 @@ CORNERS_MAX = SIZES.page_corners
 CALLS_MAX = SIZES.page_calls
 
 
-def report_page(
-    plan: Plan, text: bytes | None = None, said: dict[str, Any] | None = None, units: str | None = None
-) -> str:
+def report_page(plan: Plan, said: dict[str, Any] | None = None, units: str | None = None) -> str:
     """The page of a plan.
 
-    text : the program as it was read; None where it is not known
-    said : the summary to show; None for that of the plan
+    said  : the summary to show; None for that of the plan
     units : "mm" or "inch"; None for those of the program
 
     Raises InputError if plotly is not installed. Raises ValueError for a plan without a trajectory.
@@ -61,7 +59,7 @@ def report_page(
     if plan.trajectory is None:
         raise ValueError("report_page: the plan has no trajectory; see plan.sentence")
     columns, about = _columns(plan, units_of(plan.program, units))
-    columns["program"] = np.frombuffer(text or b"", dtype=np.uint8)
+    columns["program"] = np.frombuffer(own_text(plan.program) or b"", dtype=np.uint8)
     about["summary"] = told = said or summary(plan)
     names = list(dict.fromkeys([*about["limits"], *(told.get("held_by") or ())]))
     about["colours"] = dict(zip(names, limit_colours(names), strict=True))
@@ -95,9 +93,7 @@ def _columns(plan: Plan, units: Units) -> tuple[dict[str, Array], dict[str, Any]
     columns |= {name: of for name, (_, of) in samples.parts.items()}
     if samples.price is not None:
         columns["price"] = samples.price
-    lines = lines_of(plan, samples)
-    fields = ((field.name, getattr(lines, field.name)) for field in dataclasses.fields(lines))
-    columns |= {f"line_{name}": column for name, column in fields if column is not None}
+    columns |= {f"line_{name}": column for name, column in lines_of(plan, samples).items()}
     if program.frames:
         columns["frame"] = program.frame[shown.block]
     about = {

@@ -13,7 +13,6 @@ from planner.base.errors import InputError
 from planner.feedrate.solution import Status
 from planner.machine import machine_from_dict
 from planner.motion.chain_setpoints import tip_of_setpoints
-from planner.nc.points import own_text
 from planner.nc.reader import read_program
 from planner.planning.job.at_tip import chain_of
 from planner.planning.job.plan import Plan
@@ -24,9 +23,8 @@ from planner.report.trajectory_reader import read_trajectory, trajectory_file
 from planner.report.word_feed import WordFeed
 
 
-def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
-    """The plan that a directory holds, judged anew; its summary; and the text of its program, None for
-    points.
+def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any]]:
+    """The plan that a directory holds, judged anew, and its summary.
 
     The program is that in the directory. The plan lacks what files do not hold: the profile at the grid
     points and the prices (those are in the summary).
@@ -74,7 +72,7 @@ def saved_plan(directory: Path) -> tuple[Plan, dict[str, Any], bytes | None]:
         notes=tuple(summary["notes"]),
         timings=summary["timings_s"],
     )
-    return plan, summary, own_text(program)
+    return plan, summary
 
 
 # What the summary of a plan has, and of which kind.

@@ -21,8 +21,6 @@ from planner.base.errors import import_needed
 from planner.base.names import known_name
 from planner.base.sizes import SIZES
 from planner.machine import LINEAR_AXES
-from planner.nc.points import own_text
-from planner.planning.job.at_tip import joints_of
 from planner.report.export import check_places, write_plan
 from planner.report.figure import (
     QUANTITIES,
@@ -38,10 +36,9 @@ from planner.report.html.page import REPORT, path_picture, report_page
 from planner.report.plotly_figure import BARE, PROGRAMMED, colourings, panel_figure, scene_in_box
 from planner.report.replace import check_file, write_whole
 from planner.report.rows import VERDICT, plan_rows
-from planner.report.trajectory_file import trajectory_columns, units
+from planner.report.trajectory_file import PlanColumns
 from planner.report.trajectory_reader import Format
 from planner.report.units import Units, axis_titles, units_of
-from planner.report.word_feed import WordFeed
 from planner.sensitivity.records import WORDS
 
 if TYPE_CHECKING:
@@ -63,7 +60,7 @@ class ReportPage:
     @cached_property
     def text(self) -> str:
         """The page, HTML with all that it needs."""
-        return report_page(self._plan, own_text(self._plan.program))
+        return report_page(self._plan)
 
     def save(self, file: str | Path = REPORT, *, force: bool = False) -> Path:
         """Write the page to a file.
@@ -107,12 +104,9 @@ def plan_frame(plan: Plan) -> pandas.DataFrame:
     pd = import_needed("pandas", "a table", "notebook")
     trajectory = plan.require().trajectory
     assert trajectory is not None
-    joints = joints_of(plan)
-    word = WordFeed(plan.toolpath)
-    table: pandas.DataFrame = pd.DataFrame(trajectory_columns(trajectory, joints, word.of))
-    table.attrs["units"] = units(
-        trajectory.axes, extruder=plan.toolpath.extrusion is not None, tip=joints is not None, feed=word.units
-    )
+    columns = PlanColumns(plan)
+    table: pandas.DataFrame = pd.DataFrame(columns(trajectory))
+    table.attrs["units"] = columns.units
     return table
 
 

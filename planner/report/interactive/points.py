@@ -16,7 +16,7 @@ from planner.machine.parts import TOLERANCE_MIN
 from planner.nc.points import AXES, known_axes, program_of_points
 from planner.nc.program import Kind, Program, SplineTable
 from planner.nc.reader import read_program
-from planner.planning.job.at_tip import Judged, judged
+from planner.planning.job.at_tip import judged
 from planner.planning.job.plan import Plan
 from planner.planning.methods.registry import machine_of
 from planner.report.judging import judge
@@ -156,8 +156,8 @@ def stretched(plan: Plan, duration: float) -> Plan:
     motion, given, _ = fit_axes(read.trajectory, read.given, plan.toolpath)
     s = np.interp(theta, was.t, was.s)
     motion = dataclasses.replace(motion, s=s, block=was.block[k], line=was.line[k])
-    how = Judged(program=plan.program, toolpath=plan.toolpath, machine=plan.machine, given=given)
-    return dataclasses.replace(plan, trajectory=motion, verdict=judged(motion, how), grid=None, prices=None)
+    verdict = judged(motion, plan.program, plan.toolpath, plan.machine, given=given)
+    return dataclasses.replace(plan, trajectory=motion, verdict=verdict, grid=None, prices=None)
 
 
 def _points(points: ArrayLike, axes: str) -> tuple[FloatArray, str]:

@@ -14,8 +14,8 @@ from benchmarks.controls.export_programs import AXIS, TOLERANCE, machine, random
 from benchmarks.controls.export_rows import judged, of_file
 from benchmarks.controls.filament_judge import filament
 from planner.base.errors import InputError
-from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS, OPTIONS
+from planner.controls.export.program import Candidates
 from planner.machine import Axis, load_machine
 from planner.nc.reading import Reading
 from planner.planning.job.plan import Plan

@@ -16,9 +16,8 @@ import planner
 from benchmarks.controls import export_judge as judge
 from benchmarks.controls.export_judge import OFFSETS, STARTS, alike, path, readable, unknown_words
 from planner.base.errors import InputError
-from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS
-from planner.controls.export.program import FIRST_RUN, write_program
+from planner.controls.export.program import FIRST_RUN, Candidates, write_program
 from planner.machine import Machine
 from planner.nc.reading import Reading
 from planner.planning.job.plan import Plan

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 import planner
-from planner.controls.export.candidates import OWN_PATH, Candidates
 from planner.controls.export.chords import planned_polyline, programmed_polyline
 from planner.controls.export.controls import CONTROLS
-from planner.controls.export.program import write_program
+from planner.controls.export.program import OWN_PATH, Candidates, write_program
 from planner.geometry.distance import distance_near
 from planner.machine import Machine
 from planner.nc.program import Kind

@@ -12,8 +12,8 @@ import planner
 from benchmarks.controls.export_judge import OFFSETS, STARTS, alike, path, readable
 from planner.base.arrays import FloatArray
 from planner.base.errors import InputError
-from planner.controls.export.candidates import Candidates
 from planner.controls.export.controls import CONTROLS, is_setting
+from planner.controls.export.program import Candidates
 
 CURVE = "G21 G90\nG0 Z1\nG5.2 P1 X4 Y2 L3 F600\nP1 X6 Y3\nP1 X8 Y1\nG5.3\nM2\n"
 

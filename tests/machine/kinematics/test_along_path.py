@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from planner.base.errors import InputError
-from planner.machine.kinematics.along_path import joints_along
-from planner.machine.kinematics.chain import Chain
+from planner.machine.kinematics.chain import Chain, along
 from planner.machine.kinematics.expression import expression
 from planner.machine.parts import KinematicsData
 
@@ -48,7 +47,7 @@ def test_derivatives_are_those_of_casadi(data: dict) -> None:
             rows.append(casadi.substitute(value, t, 0))
             value = casadi.jacobian(value, t)
     oracle = casadi.Function("oracle", [jet], rows)
-    ours = joints_along(chain, chain.axes, given)
+    ours = along(chain.joints, chain.axes, given)
     for n in range(given.shape[1]):
         expected = np.array([float(v) for v in oracle(given[:, n])]).reshape(3, 4).T
         np.testing.assert_allclose(ours[:, n, :3], expected, rtol=1e-11, atol=1e-8)
@@ -64,8 +63,8 @@ def test_an_expression_is_the_closed_form_that_it_writes_down() -> None:
     turning = np.concatenate([given, np.zeros((4, 30, 1))], axis=2)
     chain = Chain(data=KinematicsData(type="head-head", pivot_length=80.0), length=0.0)
     np.testing.assert_allclose(
-        joints_along(mine, mine.axes, given),
-        joints_along(chain, chain.axes, turning)[:, :, :4],
+        along(mine.joints, mine.axes, given),
+        along(chain.joints, chain.axes, turning)[:, :, :4],
         rtol=1e-11,
         atol=1e-8,
     )
@@ -90,4 +89,4 @@ def test_what_is_no_expression_of_kinematics_is_refused(axes: str, joints, said:
 def test_places_without_derivatives_are_refused() -> None:
     rooted = expression("xyza", lambda x, y, z, a: (casadi.sqrt(x), y, z))
     with pytest.raises(InputError, match="no derivatives at place 0"):
-        joints_along(rooted, rooted.axes, np.zeros((4, 1, 4)))
+        along(rooted.joints, rooted.axes, np.zeros((4, 1, 4)))

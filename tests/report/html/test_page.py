@@ -46,7 +46,7 @@ def plan(job: Path) -> Plan:
 
 @pytest.fixture(scope="module")
 def page(plan: Plan) -> str:
-    return report_page(plan, JOB.encode())
+    return report_page(plan)
 
 
 @pytest.mark.usual_sizes
@@ -69,7 +69,7 @@ def test_places_of_an_expanded_program_name_their_calls(tmp_path: Path) -> None:
         "G21 F3000\no1 sub\nG1 X#1\no1 endsub\no2 sub\no1 call [9]\no2 endsub\nG1 Y5\no1 call [5]\no2 call\nM2\n"
     )
     plan = planner.plan(file, MILL, method="stop")
-    page = report_page(plan, file.read_bytes())
+    page = report_page(plan)
     about = json.loads(re.search(r'id="about">(.*?)</script>', page, re.DOTALL).group(1))  # type: ignore[union-attr]
     frame = column(page, "frame", "<i4")
     assert plan.trajectory is not None
@@ -89,12 +89,12 @@ def test_deviation_is_that_of_the_verdict(plan: Plan) -> None:
 def test_times_of_lines_add_up(plan: Plan) -> None:
     assert plan.trajectory is not None
     lines = lines_of(plan, samples_of(plan))
-    assert lines.line.tolist() == [2, 3, 4, 5]
-    assert lines.planned.sum() == pytest.approx(plan.trajectory.cycle_time)
-    assert np.isnan(lines.programmed[-1])
-    assert lines.programmed[1] == pytest.approx(15.0 * np.pi / 50.0)
-    assert (lines.planned[:3] > lines.programmed[:3] * (1.0 - 1e-2)).all()
-    assert (lines.highest[:3] <= 50.0 * (1 + 1e-9)).all()
+    assert lines["line"].tolist() == [2, 3, 4, 5]
+    assert lines["planned"].sum() == pytest.approx(plan.trajectory.cycle_time)
+    assert np.isnan(lines["programmed"][-1])
+    assert lines["programmed"][1] == pytest.approx(15.0 * np.pi / 50.0)
+    assert (lines["planned"][:3] > lines["programmed"][:3] * (1.0 - 1e-2)).all()
+    assert (lines["highest"][:3] <= 50.0 * (1 + 1e-9)).all()
 
 
 def test_thinned_samples_keep_the_peaks(plan: Plan) -> None:
@@ -274,11 +274,9 @@ def test_lines_and_places_have_their_prices(page: str, plan: Plan) -> None:
     assert plan.prices is not None
     assert plan.prices.places is not None
     places, lines = plan.prices.places, lines_of(plan, samples_of(plan))
-    assert lines.more_feed is not None
-    assert lines.more is not None
-    assert lines.more_feed.sum() == pytest.approx(places.feed.sum())
-    assert lines.more.sum() == pytest.approx(places.limits.sum())
-    assert np.array_equal(column(page, "line_more", "<f4"), lines.more.astype(np.float32))
+    assert lines["more_feed"].sum() == pytest.approx(places.feed.sum())
+    assert lines["more"].sum() == pytest.approx(places.limits.sum())
+    assert np.array_equal(column(page, "line_more", "<f4"), lines["more"].astype(np.float32))
     assert places.tolerance is not None
     price = column(page, "price", "<f4")
     assert price.max() == pytest.approx(-places.tolerance.min(), rel=1e-6)

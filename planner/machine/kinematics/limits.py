@@ -27,7 +27,6 @@ WIDE = 2.0
 class LinearJoint(JointLimit):
     """The limits of one linear joint of a machine through its kinematics."""
 
-
     def __init__(self, letter: str, axis: Axis, kinematics: Kinematics, radius: float):
         self.name, self.letter, self.kinematics, self.radius = f"joint {letter}", letter, kinematics, radius
         self.velocity, self.acceleration, self.jerk = axis.velocity, axis.acceleration, axis.jerk

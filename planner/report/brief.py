@@ -48,7 +48,8 @@ def brief_rows(plan: Plan, units: Units, summed: Rows | None = None) -> Rows:
     rows += saved_rows(plan) if summed is None else [(name, text) for name, text in summed if name == SAVED]
     if plan.grid is not None:
         told = [f"{limit_text(name)} {percent} %" for name, percent in plan.grid.percents()[:LIMITS]]
-        rows.append(("limited by", f"{', '.join(told)} of the time{', some together' * (len(told) > 1)}"))
+        of = f"{', '.join(told)} of the time" if told else "no limit for a hundredth of the time"
+        rows.append(("limited by", of + ", some together" * (len(told) > 1)))
     rows.append(("tolerance used", _used(plan, units)))
     failed = "; ".join([FAILED, *first_of(plan.verdict.sentences, FAULTS)])
     return [*rows, (VERDICT, PASSED if plan.verdict.passed else failed)]

@@ -46,6 +46,12 @@ def test_shares_of_limits_are_rounded_as_in_the_table_of_all_rows() -> None:
     )
 
 
+def test_shares_that_are_all_below_a_hundredth_are_told_so() -> None:
+    plan = make_plan()
+    plan.grid = dataclasses.replace(plan.grid, share=np.full(len(plan.grid.active_names), 0.004))
+    assert dict(brief_rows(plan, UNITS["mm"]))["limited by"] == "no limit for a hundredth of the time"
+
+
 def test_what_is_saved_against_a_stop_and_never_less_than_nothing() -> None:
     plan = make_plan()
     assert dict(brief_rows(plan, UNITS["mm"]))["saved"].startswith(

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import planner
 from planner.machine import Machine, load_machine
-from planner.planning.job.at_tip import Judged, judged
+from planner.planning.job.at_tip import judged
 from planner.planning.job.plan import Plan
 from planner.verifier import Verdict
 from tests.commands.command_line import run
@@ -32,7 +32,7 @@ def on(machine: Machine, made: Plan | None = None, **how: tuple[str, ...]) -> Ve
     made = made or job()
     motion = made.joints if made.joints is not None else made.trajectory
     assert motion is not None
-    return judged(motion, Judged(program=made.program, toolpath=made.toolpath, machine=machine, **how))
+    return judged(motion, made.program, made.toolpath, machine, **how)
 
 
 @pytest.mark.shows("travel", "exact: how far a motion goes beyond")

@@ -130,13 +130,18 @@ class JointLimit(ABC):
         """q at the places (n,) [`unit`]."""
         return self.joint(at)
 
+    @property
+    def constant(self) -> bool:
+        """Whether the bounds are the same everywhere."""
+        return type(self).bounds is JointLimit.bounds
+
 
 class ScaledLimit:
     """A limit with `factor` times the bounds of one of its `QUANTITIES`, else the same."""
 
     def __init__(self, limit: OwnLimit, quantity: str, factor: float):
         self.name, self.unit, self.turn = limit.name, limit.unit, limit.turn
-        self.counts = getattr(limit, "counts", None)
+        self.counts, self.constant = getattr(limit, "counts", None), getattr(limit, "constant", False)
         self._limit, self._which, self._factor = limit, QUANTITIES.index(quantity), factor
 
     def bounds(self, at: Place) -> tuple[Any, Any, Any]:

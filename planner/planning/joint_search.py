@@ -81,10 +81,14 @@ class Joint(NamedTuple):
 
 def searchable(job: Job, *, jerk_limited: bool) -> bool:
     """Whether the search knows all that the motion has to keep: no limits that it does not keep, no thread
-    behind filters; and whether there is a run to be searched. Limits of the user are left to the motion on a
-    path where no jerk is limited: that jumps from one bound to the next at once, and steps need their time."""
+    behind filters; and whether there is a run to be searched. Limits of the user whose bounds change are
+    left to the motion on a path where no jerk is limited: that jumps from one bound to the next at once, and steps need their
+    time."""
     machine, toolpath = job.real
-    own = all(jerk_limited and getattr(limit, "searched", True) for limit in machine.own)
+    own = all(
+        getattr(limit, "searched", True) and (jerk_limited or getattr(limit, "constant", False))
+        for limit in machine.own
+    )
     if not own or (machine.fir is not None and toolpath.held.any()):
         return False
     left = np.logical_or.reduceat(toolpath.exact | toolpath.held, full_stops(toolpath)[:-1])

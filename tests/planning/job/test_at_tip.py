@@ -124,3 +124,13 @@ def test_the_bow_of_the_tip_is_left_free(together: planner.Plan) -> None:
     assert room_for_joints(together.toolpath, MACHINE) == 0.0  # where x, y and z are joints
     twice = at_the_tip.model_copy(update={"dt": 2.0 * MACHINE.dt})
     assert room_for_joints(together.toolpath, twice) == pytest.approx(4.0 * reserved, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_without_jerk_limits_they_are_found_together_too(together: planner.Plan) -> None:
+    """Bounds of joints are the same everywhere, so that no step has to wait for one that jumps."""
+    found = planner.plan(together.program, MACHINE, method="second-order", effort="quick").require()
+    assert found.verdict is not None
+    assert found.verdict.passed
+    assert "together" in found.sentence
+    assert found.cycle_time < together.cycle_time

@@ -15,6 +15,7 @@ from planner.feedrate.constraints.limits import ACCELERATION, FEED, POWER, Limit
 from planner.joint import laws as rows
 from planner.machine.user_limit import (
     QUANTITIES,
+    Moving,
     OwnLimit,
     Place,
     bounds_at,
@@ -101,10 +102,14 @@ class RunLaws:
         found = np.zeros((len(motion), len(self.laws)))
         _, v, a, _ = (motion[:, k] for k in range(4))
         seen: dict[int, tuple[FloatArray, FloatArray]] = {}
+        moving: Moving | None = None
         for m, law in enumerate(self.laws):
             if law.limit is not None:
                 if id(law.limit) not in seen:
-                    seen[id(law.limit)] = self._of_limit(law.limit, where, motion)
+                    if moving is None:
+                        whole = self._whole(motion)
+                        moving = Moving.of(self.axes, [whole[:, k] for k in range(4)])
+                    seen[id(law.limit)] = self._of_limit(law.limit, where, moving)
                 value, bound = seen[id(law.limit)]
                 found[:, m] = np.abs(value[law.quantity]) / bound[:, law.quantity]
             elif law.kind == rows.POWER:
@@ -113,12 +118,10 @@ class RunLaws:
                 found[:, m] = np.linalg.norm(v * law.counts, axis=1) / self.word[where.leg, 0]
         return found
 
-    def _of_limit(self, limit: OwnLimit, where: Where, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _of_limit(self, limit: OwnLimit, where: Where, moving: Moving) -> tuple[FloatArray, FloatArray]:
         """(3, n) what a limit bounds, and (n, 3) its bounds."""
-        whole = self._whole(motion)
-        at = self._place(where, whole[:, 0], whole[:, 1])
-        derivatives = limit_derivatives(limit, self.axes, [whole[:, k] for k in range(4)])
-        return derivatives, bounds_at(limit, at, len(whole))
+        at = self._place(where, moving.table[0], moving.table[1])
+        return limit_derivatives(limit, moving), bounds_at(limit, at, moving.table.shape[1])
 
     def _whole(self, motion: FloatArray) -> FloatArray:
         """(n, 4, all) a motion (n, 4, A) over all axes."""
@@ -169,7 +172,7 @@ class RunLaws:
             ways = np.zeros((many, len(self.axes)))
             ways[:, self.axis] = way
             still = np.zeros_like(ways)
-            return limit_derivatives(limit, self.axes, [place, ways, still, still])
+            return limit_derivatives(limit, Moving.of(self.axes, [place, ways, still, still]))
 
         unit = np.eye(axes)
         first, second = np.empty((many, axes)), np.empty((many, axes, axes))

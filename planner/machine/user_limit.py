@@ -29,9 +29,11 @@ rows are not close to linear and a margin (feedrate/sampling/user_rows.py), tigh
 the motions of all methods by them, from the delivered positions (verifier/other_limits.py).
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -191,12 +193,23 @@ def bounds_at(limit: OwnLimit, at: Place, count: int) -> FloatArray:
     return found
 
 
-def limit_derivatives(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
-    """(3, n) the first three derivatives of q where the position has the value and the derivatives `motion`,
-    4 arrays (n, A), with respect to whatever those are. Raises InputError where they are not finite."""
-    table = np.stack(motion)
-    columns = [Series(table[:, :, k]) for k in range(len(axes))]
-    found = limit.value(Place(axes, columns, table[1]))
+class Moving(NamedTuple):
+    """A motion through n places: their `Place` with derivatives, and the motion (4, n, A) itself."""
+
+    place: Place
+    table: FloatArray
+
+    @classmethod
+    def of(cls, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> Moving:
+        """That of the position and its derivatives with respect to anything, 4 arrays (n, A)."""
+        table = np.stack(motion)
+        return cls(Place(axes, [Series(table[:, :, k]) for k in range(len(axes))], table[1]), table)
+
+
+def limit_derivatives(limit: OwnLimit, moving: Moving) -> FloatArray:
+    """(3, n) the first three derivatives of q with respect to what those of the motion are. Raises InputError where they are not
+    finite."""
+    found, table, axes = limit.value(moving.place), moving.table, moving.place.axes
     if found is None:
         counts = np.isin(axes, getattr(limit, "counts", None) or axes)
         return along_path(*table[1:, :, counts])[0]

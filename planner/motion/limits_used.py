@@ -10,7 +10,7 @@ import numpy as np
 from planner.base.arrays import FloatArray
 from planner.feedrate.constraints.limits import NORMAL, Limits
 from planner.machine import LINEAR_AXES
-from planner.machine.user_limit import OwnLimit, Place, along_path, bounds_at, limit_derivatives
+from planner.machine.user_limit import Moving, OwnLimit, Place, along_path, bounds_at, limit_derivatives
 from planner.motion.trajectory import Trajectory
 
 REST = 1e-6  # [mm/s] below this, the direction of a velocity is rounding
@@ -56,8 +56,9 @@ def _along(limits: Sequence[OwnLimit], motion: Trajectory) -> Iterator[tuple[int
         return
     _, direction = along_path(*columns)
     place = Place(motion.axes, list(motion.position.T), direction, motion.block)
+    moving = Moving.of(motion.axes, (motion.position, *columns))
     for limit in limits:
         bounds = bounds_at(limit, place, len(motion.t))
-        values = limit_derivatives(limit, motion.axes, (motion.position, *columns))
+        values = limit_derivatives(limit, moving)
         for k in range(3):
             yield k + 1, np.abs(values[k]) / bounds[:, k]

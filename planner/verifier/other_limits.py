@@ -120,13 +120,18 @@ def look_at_user_limits(block: SampleBlock, limits: Limits, worst: Worst) -> Non
         return
     path, direction = along_path(block, delivered=bool(limits.judged[0]))
     error = position_error(block, limits)
-    for row, limit in enumerate(limits.user):
+    # places are shared by the limits: what one computes there others need not
+    place = _place(limits.axes, block.position.T, direction)
+    values = [limit.value(place) for limit in limits.user]
+    motion = np.stack([block.position, block.velocity, block.acceleration, block.jerk])
+    in_motion = _moving_place(limits.axes, motion, motion[1])
+    along_axes = range(len(limits.axes) if any(q is not None for q in values) else 0)
+    moved = [_moving_place(limits.axes, _along_axis(block, k), direction) for k in along_axes]
+    for row, (limit, q) in enumerate(zip(limits.user, values, strict=True)):
         row = (GROUPS + 1) * len(limits.axes) + ROWS_ALONE + 3 * row
-        place = _place(limits.axes, block.position.T, direction)
         bounds = np.stack([np.broadcast_to(b, len(block.t)) for b in limit.bounds(place)], axis=1)
-        q = limit.value(place)
         judged = limits.judged if q is None else [limits.judged.all()] * 3
-        rates = path if q is None else _rates(limit, limits.axes, block) if judged[0] else None
+        rates = path if q is None else _rates(limit, in_motion, len(block.t)) if judged[0] else None
         for order in range(3):
             if all(judged[: order + 1]) and rates is not None:
                 value, bound = np.abs(rates[order]), bounds[:, order]
@@ -138,12 +143,10 @@ def look_at_user_limits(block: SampleBlock, limits: Limits, worst: Worst) -> Non
         else:
             q = np.broadcast_to(np.asarray(q, dtype=np.float64), len(block.t))
             off = ROUNDING_ULPS * 2.0**-52 * np.abs(q)
-            for moved in range(len(limits.axes)):  # dq/dx times the error of x
-                lines = np.zeros((len(limits.axes), 4, len(q)))
-                lines[:, 0], lines[moved, 1] = block.position.T, 1.0
-                found = limit.value(_place(limits.axes, [Series(line) for line in lines], direction))
+            for k, there in enumerate(moved):  # dq/dx times the error of x
+                found = limit.value(there)
                 if isinstance(found, Series):
-                    off = off + np.abs(found.derivatives[1]) * error[:, moved]
+                    off = off + np.abs(found.derivatives[1]) * error[:, k]
             seen = list(map(less_error, differences(block.t, q[:, None], off[:, None], limit.turn)))
         for order, value in enumerate(seen):
             bound = _largest(bounds[:, order], order + 1)
@@ -170,11 +173,22 @@ def along_path(block: SampleBlock, *, delivered: bool) -> tuple[FloatArray, Floa
     return np.stack([speed, along, np.einsum("nk,nk->n", j, t) + turning]) * moving, t
 
 
-def _rates(limit: Any, axes: tuple[str, ...], block: SampleBlock) -> FloatArray:
+def _moving_place(axes: tuple[str, ...], motion: FloatArray, direction: FloatArray) -> SimpleNamespace:
+    """The places of a motion (4, n, A), with its derivatives."""
+    return _place(axes, [Series(motion[:, :, k]) for k in range(len(axes))], direction)
+
+
+def _along_axis(block: SampleBlock, axis: int) -> FloatArray:
+    """(4, n, A) a motion along one of the axes, at its pace 1, through the samples."""
+    motion = np.zeros((4, *block.position.shape))
+    motion[0], motion[1, :, axis] = block.position, 1.0
+    return motion
+
+
+def _rates(limit: Any, in_motion: SimpleNamespace, count: int) -> FloatArray:
     """(3, n) derivatives of q by the time."""
-    motion = np.stack([block.position, block.velocity, block.acceleration, block.jerk])
-    found = limit.value(_place(axes, [Series(motion[:, :, k]) for k in range(len(axes))], motion[1]))
-    rates: FloatArray = found.derivatives[1:] if isinstance(found, Series) else np.zeros((3, len(block.t)))
+    found = limit.value(in_motion)
+    rates: FloatArray = found.derivatives[1:] if isinstance(found, Series) else np.zeros((3, count))
     return rates
 
 

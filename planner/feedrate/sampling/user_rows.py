@@ -13,7 +13,6 @@ more to a solver: the rows q', q'', q''' with the limits a, j, and the cap feed^
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from planner.corners.elements import element_point, to_arc_length
 from planner.feedrate.constraints.limits import Limits
 from planner.feedrate.sampling.grid import JERK_SHARE, MARGIN_SAFETY
 from planner.feedrate.sampling.path_samples import PathSamples
-from planner.machine.user_limit import OwnLimit, Place, bounds_at, limit_derivatives
+from planner.machine.user_limit import Moving, OwnLimit, Place, bounds_at, limit_derivatives
 
 # Of the resolution, what a bound may be less in the middle of an interval than the mean of its ends [-].
 BOUND_SHARE = 5.0
@@ -69,7 +68,13 @@ def user_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) 
     middle = 0.5 * (samples.w0[at] + samples.w1[at])
     inside = _points(*samples.table, samples.element[at], middle, axes)
     real = _real_bounds(samples, limits, at, inside)
-    found = [_column(limit, samples, at, inside, real, resolution) for limit in limits.along]
+    axes_of = samples.path.toolpath.axes
+    motions = (
+        Moving.of(axes_of, (samples.position, samples.d1, samples.d2_left, samples.d3_left)),
+        Moving.of(axes_of, (samples.position, samples.d1, samples.d2_right, samples.d3_right)),
+        Moving.of(axes_of, tuple(inside[:, k] for k in range(4))),
+    )
+    found = [_column(limit, samples, at, motions, real, resolution) for limit in limits.along]
     columns, errors, coarse = zip(*found, strict=True)
     margin, divided = np.zeros(len(samples)), np.zeros(len(samples), dtype=bool)
     # the middle of an interval does not tell all
@@ -99,19 +104,19 @@ def _column(
     limit: OwnLimit,
     samples: PathSamples,
     at: Array,
-    inside: FloatArray,
+    motions: tuple[Moving, Moving, Moving],
     real: tuple[FloatArray, float, FloatArray],
     resolution: float,
 ) -> tuple[tuple[FloatArray, ...], FloatArray, Array]:
-    """One limit: the first fields of `UserRows`, (P,) or (3,) each; of the intervals (n,) the errors of the rows,
-    and which need points."""
+    """One limit, by the motions left and right of the points and in the middle of the intervals: the first fields of `UserRows`,
+    (P,) or (3,) each; of the intervals (n,) the errors of the rows, and which need points."""
     axes, points = samples.path.toolpath.axes, len(samples)
-    left = (samples.position, samples.d1, samples.d2_left, samples.d3_left)
-    right = (samples.position, samples.d1, samples.d2_right, samples.d3_right)
-    middle = tuple(inside[:, k] for k in range(4))
+    _, right, middle = motions
     block = samples.path.toolpath.block[samples.segment]
-    here, between = (Place(axes, list(p[0].T), p[1], b) for p, b in ((right, block), (middle, block[at])))
-    q_left, q_right, q_mid = (_along(limit, axes, p) for p in (left, right, middle))
+    here, between = (
+        Place(axes, list(p.table[0].T), p.table[1], b) for p, b in ((right, block), (middle, block[at]))
+    )
+    q_left, q_right, q_mid = (_along(limit, p) for p in motions)
     bound, bound_mid = bounds_at(limit, here, points), bounds_at(limit, between, len(at))
     a, b = at, at + 1
     real_sq, u, real_jerk = real
@@ -154,12 +159,12 @@ def _column(
     return (*rows, least, acceleration, jerk, feed_sq), error, coarse
 
 
-def _along(limit: OwnLimit, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> FloatArray:
+def _along(limit: OwnLimit, moving: Moving) -> FloatArray:
     """(3, n) q', q'', q''' by the arc length; of the length of the path without rounding."""
-    found = limit_derivatives(limit, axes, motion)
-    if limit.value(Place(axes, list(motion[0].T), motion[1])) is None:
+    axes, found = moving.place.axes, limit_derivatives(limit, moving)
+    if limit.value(moving.place) is None:
         whole = np.isin(axes, getattr(limit, "counts", None) or axes)
-        alone = ~(np.abs(np.stack(motion[1:])[:, :, ~whole]) > 0.0).any(axis=(0, 2))
+        alone = ~(np.abs(moving.table[1:, :, ~whole]) > 0.0).any(axis=(0, 2))
         found[:, alone] = [[1.0], [0.0], [0.0]]
     return found
 

@@ -32,9 +32,14 @@ class LinearJoint(JointLimit):
         self.velocity, self.acceleration, self.jerk = axis.velocity, axis.acceleration, axis.jerk
 
     def joint(self, at: Place) -> Any:
-        """The joint where the tip and the rotary axes are at the place [mm]."""
-        place = {letter: getattr(at, letter) for letter in at.axes}
-        return self.kinematics.joints(in_rad(place, self.radius))[self.letter]
+        """The joint where the tip and the rotary axes are at the place [mm]. All three joints are kept with the place, as the
+        others ask for theirs there, too."""
+        kept = vars(at)
+        if kept.get("_joints_of") is not self.kinematics:
+            place = {letter: getattr(at, letter) for letter in at.axes}
+            kept["_joints"] = self.kinematics.joints(in_rad(place, self.radius))
+            kept["_joints_of"] = self.kinematics
+        return kept["_joints"][self.letter]
 
 
 def at_tip(machine: Machine, kinematics: Kinematics | None = None, *, wide: float | None = WIDE) -> Machine:

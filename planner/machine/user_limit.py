@@ -201,7 +201,7 @@ class Moving(NamedTuple):
 
     @classmethod
     def of(cls, axes: tuple[str, ...], motion: Sequence[FloatArray]) -> Moving:
-        """That of the position and its derivatives with respect to anything, 4 arrays (n, A)."""
+        """Of a `motion`, 4 arrays (n, A): the position and its derivatives with respect to anything."""
         table = np.stack(motion)
         return cls(Place(axes, [Series(table[:, :, k]) for k in range(len(axes))], table[1]), table)
 

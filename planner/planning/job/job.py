@@ -84,7 +84,7 @@ class Job:
         return dataclasses.replace(
             self,
             machine=planned,
-            toolpath=dataclasses.replace(toolpath, tolerance=share * toolpath.tolerance),
+            toolpath=dataclasses.replace(toolpath, tolerance=share * self.toolpath.tolerance),
             judged=(machine, toolpath),
         )
 

@@ -64,15 +64,14 @@ def _points(legs, corners, spans, element, w, axes):
 
 def user_rows(samples: PathSamples, limits: Limits, resolution: float = np.inf) -> UserRows:
     """The rows of the limits `along`; `resolution`: how far off the chord they may be, of the limits."""
-    at, axes = samples.intervals, len(samples.path.toolpath.axes)
+    at, axes = samples.intervals, samples.path.toolpath.axes
     middle = 0.5 * (samples.w0[at] + samples.w1[at])
-    inside = _points(*samples.table, samples.element[at], middle, axes)
+    inside = _points(*samples.table, samples.element[at], middle, len(axes))
     real = _real_bounds(samples, limits, at, inside)
-    axes_of = samples.path.toolpath.axes
     motions = (
-        Moving.of(axes_of, (samples.position, samples.d1, samples.d2_left, samples.d3_left)),
-        Moving.of(axes_of, (samples.position, samples.d1, samples.d2_right, samples.d3_right)),
-        Moving.of(axes_of, tuple(inside[:, k] for k in range(4))),
+        Moving.of(axes, (samples.position, samples.d1, samples.d2_left, samples.d3_left)),
+        Moving.of(axes, (samples.position, samples.d1, samples.d2_right, samples.d3_right)),
+        Moving.of(axes, tuple(inside[:, k] for k in range(4))),
     )
     found = [_column(limit, samples, at, motions, real, resolution) for limit in limits.along]
     columns, errors, coarse = zip(*found, strict=True)

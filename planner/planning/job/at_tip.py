@@ -1,9 +1,10 @@
 """Jobs of the tool's tip: planned through the kinematics, delivered and judged in the joints.
 
 Between two setpoints the joints run straight, and the tip does not: its way bows from the chord between both tips
-by about dt^2/8 |D2p(q', q')|, p the tip as a function of the joints q. What that is at most, as fast as feed and
+by about dt^2/8 |D2p(q', q')|, p the tip as a function of the joints q. The largest on the path, as fast as feed and
 joints allow, is left free of the tolerance (`room_for_joints`), as the verdict adds the largest bow to the
-contour error.
+contour error. It is no bound: it is looked at in some places of each block, and a motion may leave the path within the
+tolerance; the verdict tells.
 """
 
 import dataclasses
@@ -42,8 +43,8 @@ def chain_of(program: Program, machine: Machine) -> Chain | None:
 
 
 def room_for_joints(toolpath: Toolpath, machine: Machine) -> float:
-    """How far the tip leaves its chord between two setpoints of the joints on the path, at most (module text) [mm]; 0 where
-    the machine is not one for the tip (`at_tip`)."""
+    """The largest that is found on the path of how far the tip leaves its chord between two setpoints of the joints (module
+    text) [mm]; 0 where the machine is not one for the tip (`at_tip`)."""
     joints = {limit.letter: limit for limit in machine.own if isinstance(limit, LinearJoint)}
     chain = next((one.kinematics for one in joints.values() if isinstance(one.kinematics, Chain)), None)
     if chain is None:

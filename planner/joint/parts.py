@@ -6,8 +6,9 @@ they meet.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -50,7 +51,12 @@ def _columns(motion: MotionInTime, times: FloatArray) -> dict[str, Array]:
     if isinstance(motion, AxisMotion):
         return motion.columns(times)
     seen = motion.at(times, 1.0)
-    return {name: getattr(seen, name) for name in ("position", "block", "line", "s", *RATES)}
+    return {name: getattr(seen, name) for name in ("position", "block", "line", *RATES)}
+
+
+def _length(motion: MotionInTime, times: FloatArray) -> FloatArray:
+    """(T,) arc length of the motion at ascending times (T,) [mm]."""
+    return motion.length(times) if isinstance(motion, AxisMotion) else motion.at(times, 1.0).s
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -87,32 +93,48 @@ class Spliced:
     @cached_property
     def _own_length(self) -> FloatArray:
         """(n, 2) arc length in the motion of each run where that begins and ends [mm]."""
-        return np.array([_columns(run.motion, np.array([run.begin, run.end]))["s"] for run in self.runs])
+        return np.array([_length(run.motion, np.array([run.begin, run.end])) for run in self.runs])
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
         period."""
+        seen = [self._seen(*part) for part in self._parts(times)]
+        columns: dict[str, Any] = {name: np.concatenate([one[name] for one in seen]) for name in seen[0]}
+        one = self.runs[0].motion.at(np.array([self.runs[0].begin]), dt)
+        columns["s"] = partial(self._lengths, times)
+        return dataclasses.replace(one, t=times, **columns)
+
+    def _parts(self, times: FloatArray) -> Iterator[tuple[int, FloatArray, FloatArray, Array | slice]]:
+        """The runs at ascending times (T,): number of the run, times in its motion, which may be behind its end, those of
+        them that differ, ascending and not behind it, and which of these each is."""
         of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
         edges = np.append(np.flatnonzero(np.diff(of, prepend=-1)), len(of))
         # Without times there are the columns of the first run, without rows.
-        parts = [(int(of[lo]), lo, hi) for lo, hi in pairwise(edges.tolist())] or [(0, 0, 0)]
-        seen = [self._seen(k, times[lo:hi]) for k, lo, hi in parts]
-        columns: dict[str, Any] = {name: np.concatenate([one[name] for one in seen]) for name in seen[0]}
-        one = self.runs[0].motion.at(np.array([self.runs[0].begin]), dt)
-        return dataclasses.replace(one, t=times, **columns)
+        for lo, hi in list(pairwise(edges.tolist())) or [(0, 0)]:
+            k = int(of[lo]) if hi else 0
+            run = self.runs[k]
+            local = run.begin + (times[lo:hi] - self.begin[k])
+            if run.moving:  # rounding of times: its end belongs to the next one
+                local = np.minimum(local, np.nextafter(run.end, run.begin))
+            single = np.minimum(local, run.end)
+            which: Array | slice = slice(None)
+            if not (np.diff(single) > 0.0).all():
+                single, which = np.unique(single, return_inverse=True)
+            yield k, local, single, which
 
-    def _seen(self, k: int, times: FloatArray) -> dict[str, Array]:
-        """The columns of the motion of run k at these times."""
+    def _lengths(self, times: FloatArray) -> FloatArray:
+        """(T,) arc length at ascending times (T,) [mm]."""
+        return np.concatenate(
+            [
+                self.length[k] + _length(self.runs[k].motion, single)[which] - self._own_length[k, 0]
+                for k, _, single, which in self._parts(times)
+            ]
+        )
+
+    def _seen(self, k: int, local: FloatArray, single: FloatArray, which: Array | slice) -> dict[str, Array]:
+        """The columns of the motion of run k, as `_parts` has them."""
         run = self.runs[k]
-        local = run.begin + (times - self.begin[k])
-        if run.moving:  # rounding of times: its end belongs to the next one
-            local = np.minimum(local, np.nextafter(run.end, run.begin))
-        single = np.minimum(local, run.end)
-        which: Array | slice = slice(None)
-        if not (np.diff(single) > 0.0).all():
-            single, which = np.unique(single, return_inverse=True)
         columns = {name: column[which] for name, column in _columns(run.motion, single).items()}
-        columns["s"] = self.length[k] + columns["s"] - self._own_length[k, 0]
         over = local >= run.end  # there another motion may begin
         if over.any():
             for name in RATES:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -85,15 +85,20 @@ class AxisMotion:
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's period."""
-        return Trajectory(axes=self.axes, radius=self.radius, dt=dt, t=times, **self.columns(times))
+        columns: dict[str, Any] = self.columns(times) | {"s": partial(self.length, times)}
+        return Trajectory(axes=self.axes, radius=self.radius, dt=dt, t=times, **columns)
 
-    def columns(self, times: FloatArray) -> dict[str, Any]:
-        """Those of a trajectory at ascending times (T,) within [0, end], but for the times."""
+    def columns(self, times: FloatArray) -> dict[str, Array]:
+        """Those of a trajectory at ascending times (T,) within [0, end], but for the times and the arc length."""
         state = (self.position, self.velocity, self.acceleration, self.jerk)
-        pieces = self.t, *state, self.s, float(self.end)
-        motion, s, feed, piece = _sample(pieces, times)
-        found: dict[str, Any] = dict(zip(LEVELS, motion, strict=True))
-        return found | {"s": s, "feed": feed, "block": self.block[piece], "line": self.line[piece]}
+        motion, feed, piece = _sample((self.t, *state, float(self.end)), times)
+        found: dict[str, Array] = dict(zip(LEVELS, motion, strict=True))
+        return found | {"feed": feed, "block": self.block[piece], "line": self.line[piece]}
+
+    def length(self, times: FloatArray) -> FloatArray:
+        """(T,) arc length at ascending times (T,) within [0, end] [mm]."""
+        rates = (self.velocity, self.acceleration, self.jerk)
+        return _lengths((self.t, *rates, self.s, float(self.end)), times)
 
     def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
         """The motion standing longer by `by` (n,) [s] at the piece ends nearest to `at` (n,), its rests."""
@@ -168,11 +173,11 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 
 @njit(cache=True, error_model="numpy")
 def _sample(pieces, times):
-    """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,)."""
-    t, position, velocity, acceleration, jerk, s, end = pieces
+    """Position and derivatives (4, T, A) at ascending times (T,), and feed and piece there (T,)."""
+    t, position, velocity, acceleration, jerk, end = pieces
     samples, axes = len(times), position.shape[1]
     columns = np.empty((4, samples, axes))
-    s_out, feed, piece = np.empty(samples), np.empty(samples), np.empty(samples, np.int64)
+    feed, piece = np.empty(samples), np.empty(samples, np.int64)
     last = len(t) - 1
     m = last_not_after(t, times[0], 0, last)
     for n in range(len(times)):
@@ -187,7 +192,20 @@ def _sample(pieces, times):
             columns[2, n, k] = 0.0 if over else a + tau * j
             columns[3, n, k] = 0.0 if over else j
             speed_sq += columns[1, n, k] ** 2
-        here = s[m] + _arc_length(velocity[m], acceleration[m], jerk[m], tau)
-        s_out[n] = min(here, s[m + 1])
         feed[n], piece[n] = np.sqrt(speed_sq), m
-    return columns, s_out, feed, piece
+    return columns, feed, piece
+
+
+@njit(cache=True, error_model="numpy")
+def _lengths(pieces, times):
+    """Arc length (T,) [mm] at ascending times (T,)."""
+    t, velocity, acceleration, jerk, s, end = pieces
+    found = np.empty(len(times))
+    last = len(t) - 1
+    m = last_not_after(t, times[0], 0, last)
+    for n in range(len(times)):
+        while m < last and t[m + 1] <= times[n]:
+            m += 1
+        length = _arc_length(velocity[m], acceleration[m], jerk[m], min(times[n], end) - t[m])
+        found[n] = min(s[m] + length, s[m + 1])
+    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,7 +33,7 @@ class Trajectory:
     velocity     : (T, A) [mm/s]
     acceleration : (T, A) [mm/s2]; where it jumps, the value after the jump
     jerk         : (T, A) [mm/s3]; where it jumps, the value after the jump
-    s            : (T,) arc length along the path of the motion [mm], non-decreasing
+    s            : (T,) arc length along the path of the motion [mm], non-decreasing; or what gives it when it is first asked for
     feed         : (T,) ds/dt [mm/s]
     block        : (T,) index of the block of the program
     line         : (T,) NC line of that block
@@ -56,7 +57,12 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         samples, axes = len(self.t), len(self.axes)
-        freeze(self, "t s feed", np.float64, (samples,))
+        if callable(self.s):  # a quadrature, which takes many times as long as all other columns
+            object.__setattr__(self, "_length", self.s)
+            object.__delattr__(self, "s")
+        else:
+            freeze(self, "s", np.float64, (samples,))
+        freeze(self, "t feed", np.float64, (samples,))
         freeze(self, "position velocity acceleration jerk", np.float64, (samples, axes))
         freeze(self, "block", np.int64, (samples,))
         freeze(self, "line", np.int32, (samples,))
@@ -65,6 +71,13 @@ class Trajectory:
             raise ValueError(f"Trajectory.dt: {self.dt} s; must be positive")
         if samples and not (np.diff(self.t) > 0).all():
             raise ValueError("Trajectory.t: times must increase strictly")
+
+    def __getattr__(self, name: str) -> Any:
+        if name != "s" or "_length" not in vars(self):
+            raise AttributeError(name)
+        object.__setattr__(self, "s", vars(self).pop("_length")())
+        freeze(self, "s", np.float64, (len(self.t),))
+        return self.s
 
     def __len__(self) -> int:
         return len(self.t)
@@ -88,6 +101,11 @@ class Trajectory:
     def in_degrees(self) -> FloatArray:
         """(A,) what turns positions and their derivatives into mm and degrees."""
         return in_degrees(self.axes, self.radius)
+
+    @property
+    def length(self) -> Callable[[], FloatArray]:
+        """What gives `s` (T,), which it is not asked for here."""
+        return vars(self).get("_length") or partial(np.asarray, self.s)
 
     def chunks(self) -> Iterator[Trajectory]:
         """All samples in order, one part after the other. What goes through a long motion takes its parts, so
@@ -150,5 +168,11 @@ def joined(chunks: list[Trajectory]) -> Trajectory:
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(c, name)[skip:] for c, skip in zip(chunks, fresh, strict=True)])
         for name in chunks[0].columns
+        if name != "s"
     }
+    columns["s"] = partial(_lengths, [c.length for c in chunks], fresh)
     return dataclasses.replace(chunks[0], **columns)
+
+
+def _lengths(of_chunks: list[Callable[[], FloatArray]], fresh: list[int]) -> FloatArray:
+    return np.concatenate([length()[skip:] for length, skip in zip(of_chunks, fresh, strict=True)])

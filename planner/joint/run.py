@@ -38,6 +38,7 @@ from planner.geometry.toolpath import Joint, Toolpath
 from planner.joint.laws import PUSH
 from planner.joint.leg_shapes import LegShapes, edges_of, shapes_of, word_change, word_shares, words_of
 from planner.joint.own_laws import RunLaws, laws_of
+from planner.joint.step_limits import OfRun
 from planner.machine import Machine
 from planner.machine.user_limit import QUANTITIES
 
@@ -144,6 +145,26 @@ class TubeRun(LegShapes):
     def room(self) -> FloatArray:
         """(R,) how far control points of a step may be from their places on the leg [mm]."""
         return np.where(self.curvature > 0, self.budget - ARC_FRACTION * self.budget, self.budget)
+
+    @cached_property
+    def off_by_jerk(self) -> float:
+        """How far chords that pass a place at another share than the middle are off by jerk (numbers.py) [mm]."""
+        # without limits nothing is known of it
+        jerk = np.linalg.norm(self.jerk) if np.isfinite(self.jerk).all() else 0.0
+        return float(jerk) * self.chord**3 / 6.0
+
+    @cached_property
+    def of_steps(self) -> OfRun:
+        """What the limits of steps are made of, for their kernel."""
+        names = "room vertex_budget vertex offset feed across_max curvature step_max switch passed"
+        return OfRun(
+            **{name: getattr(self, name) for name in names.split()},
+            by_jerk=self.off_by_jerk,
+            fastest=float(np.linalg.norm(self.velocity)),
+            strongest=float(np.linalg.norm(self.acceleration)),
+            slowest=float(self.velocity.min()),
+            jerky=bool(np.isfinite(self.jerk).all()),
+        )
 
     @cached_property
     def switch(self) -> FloatArray:

@@ -16,14 +16,14 @@ itself on straight pieces. It has a kink where the motion turns back, hence step
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze, read_only
 from planner.base.kernels import njit
 from planner.base.search import last_not_after, nearest
 from planner.geometry.toolpath import Toolpath
@@ -36,6 +36,38 @@ SMALLEST_STEP = 2.0**-30
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0
 LEVELS = COLUMNS[1:5]  # position, velocity, acceleration, jerk
+OF_PIECES = ("t", *LEVELS, "block", "line")
+
+
+class Pieces(NamedTuple):
+    """The L pieces of n motions (`AxisMotion`) over the same axes, one motion after the other, each in its own time."""
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    block: Array
+    line: Array
+    s: FloatArray  # (L + n,) of each motion one more than it has pieces
+    first: Array  # (n+1,) piece of each motion
+    end: FloatArray  # (n,) [s]
+
+    @classmethod
+    def of(cls, motions: Sequence[AxisMotion | None]) -> Pieces:
+        """Those of several motions; None stands for one without pieces."""
+        given = [one.pieces for one in motions if one is not None]
+        columns = {name: np.concatenate([getattr(one, name) for one in given]) for name in (*OF_PIECES, "s")}
+        columns |= {name: read_only(columns[name]) for name in OF_PIECES}
+        first = np.append(0, np.cumsum([0 if one is None else len(one) for one in motions]))
+        return cls(**columns, first=first, end=np.array([0.0 if one is None else one.end for one in motions]))
+
+    def at(self, of: Array, times: FloatArray) -> dict[str, Any]:
+        """The columns of a trajectory, but for the times, of the motions `of` (T,) at their times (T,) within [0, end]; both
+        ascend."""
+        motion, s, feed, piece = _sample(self, of, times)
+        found: dict[str, Any] = dict(zip(LEVELS, motion, strict=True))
+        return found | {"s": s, "feed": feed, "block": self.block[piece], "line": self.line[piece]}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,11 +121,13 @@ class AxisMotion:
 
     def columns(self, times: FloatArray) -> dict[str, Any]:
         """Those of a trajectory at ascending times (T,) within [0, end], but for the times."""
-        state = (self.position, self.velocity, self.acceleration, self.jerk)
-        pieces = self.t, *state, self.s, float(self.end)
-        motion, s, feed, piece = _sample(pieces, times)
-        found: dict[str, Any] = dict(zip(LEVELS, motion, strict=True))
-        return found | {"s": s, "feed": feed, "block": self.block[piece], "line": self.line[piece]}
+        return self.pieces.at(np.zeros(len(times), dtype=np.int64), times)
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """Those of this motion alone."""
+        columns = {name: getattr(self, name) for name in (*OF_PIECES, "s")}
+        return Pieces(**columns, first=np.array([0, len(self)]), end=np.array([float(self.end)]))
 
     def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
         """The motion standing longer by `by` (n,) [s] at the piece ends nearest to `at` (n,), its rests."""
@@ -167,15 +201,24 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _sample(pieces, times):
-    """Position and derivatives (4, T, A) at ascending times (T,), and s, feed and piece there (T,)."""
-    t, position, velocity, acceleration, jerk, s, end = pieces
+def _sample(pieces, of, times):
+    """Position and derivatives (4, T, A) of the motions `of` (T,) at their times (T,), and s, feed and piece there (T,)."""
+    t, position, velocity, acceleration, jerk = (
+        pieces.t,
+        pieces.position,
+        pieces.velocity,
+        pieces.acceleration,
+        pieces.jerk,
+    )
     samples, axes = len(times), position.shape[1]
     columns = np.empty((4, samples, axes))
     s_out, feed, piece = np.empty(samples), np.empty(samples), np.empty(samples, np.int64)
-    last = len(t) - 1
-    m = last_not_after(t, times[0], 0, last)
+    run, m, last, end = -1, 0, 0, 0.0
     for n in range(len(times)):
+        if of[n] != run:
+            run = of[n]
+            last, end = pieces.first[run + 1] - 1, pieces.end[run]
+            m = last_not_after(t, times[n], pieces.first[run], last)
         while m < last and t[m + 1] <= times[n]:
             m += 1
         over = times[n] >= end
@@ -187,7 +230,7 @@ def _sample(pieces, times):
             columns[2, n, k] = 0.0 if over else a + tau * j
             columns[3, n, k] = 0.0 if over else j
             speed_sq += columns[1, n, k] ** 2
-        here = s[m] + _arc_length(velocity[m], acceleration[m], jerk[m], tau)
-        s_out[n] = min(here, s[m + 1])
+        here = pieces.s[m + run] + _arc_length(velocity[m], acceleration[m], jerk[m], tau)
+        s_out[n] = min(here, pieces.s[m + run + 1])
         feed[n], piece[n] = np.sqrt(speed_sq), m
     return columns, s_out, feed, piece

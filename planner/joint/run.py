@@ -35,8 +35,10 @@ from planner.base.arrays import Array, FloatArray, freeze
 from planner.corners.budget import chord_rate, filter_rate, largest_normal
 from planner.feedrate.constraints.limits import JERK, Limits
 from planner.geometry.toolpath import Joint, Toolpath
+from planner.joint.checks import Keeps
 from planner.joint.laws import PUSH
 from planner.joint.leg_shapes import LegShapes, edges_of, shapes_of, word_change, word_shares, words_of
+from planner.joint.legs import LegFormulas
 from planner.joint.own_laws import RunLaws, laws_of
 from planner.joint.step_limits import OfRun
 from planner.machine import Machine
@@ -165,6 +167,15 @@ class TubeRun(LegShapes):
             slowest=float(self.velocity.min()),
             jerky=bool(np.isfinite(self.jerk).all()),
         )
+
+    @cached_property
+    def keeps(self) -> Keeps:
+        """The limits of steps, for the kernels that look at them."""
+        formula = ("length", "base", "drift", "e1", "e2", "radius", "rate", "curve")
+        same = ("velocity", "acceleration", "jerk", "feed", "budget", "curvature", "vertex_budget", "passed")
+        of_legs, of_run = ({name: getattr(self, name) for name in names} for names in (formula, same))
+        legs = LegFormulas(**of_legs, points=self.curves.points, weight=self.curves.weight)
+        return Keeps(legs=legs, normal=self.across_max, lag=self.lag, chord=self.chord, **of_run)
 
     @cached_property
     def switch(self) -> FloatArray:

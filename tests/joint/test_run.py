@@ -18,7 +18,8 @@ from planner.joint.guess import Guess
 from planner.joint.legs import formula_point, nearest_point
 from planner.joint.motion import closed, integrated
 from planner.joint.nlp import TubeNLP
-from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.run import TubeRun
+from planner.joint.runs import tube_runs_of
 from planner.nc.reader import parse_program
 
 MACHINE = problems.machine()

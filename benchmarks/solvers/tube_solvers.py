@@ -29,7 +29,8 @@ from planner.joint.guess import Guess, guesses_from
 from planner.joint.nlp import TubeNLP
 from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
-from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.run import TubeRun
+from planner.joint.runs import tube_runs_of
 from planner.joint.solvers import TubeSolver
 from planner.machine import Machine
 from planner.motion.vertex_times import passing_times

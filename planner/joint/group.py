@@ -3,11 +3,12 @@ numbers of all windows behind each other in the last dimension, filled up to the
 no rows.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 from planner.base.views import size
 from planner.geometry.curves import ordinates
 from planner.joint.laws import LawRows
@@ -90,94 +91,47 @@ class Held(NamedTuple):
     at: Array  # (4 A + 1,) where the numbers of its step are among those of the kernel's
 
 
+# What steps have that a window has not, where that is not 0: it must not be divided by.
+_FILL = {
+    **dict.fromkeys(
+        ["per_drift", "length", "per_box", "room", "room_node", "feed", "feed_node", "normal", "normal_node"],
+        1.0,
+    ),
+    **dict.fromkeys(["pace", "per_h", "h", "per_step"], 1.0),
+    **{"h_max": 2.0, "h_min": 0.5},
+}
+
+
 def group_of(
     windows: list[StepWindow], width: int
 ) -> tuple[Sizes, Group, Held | None, FloatArray, FloatArray, FloatArray]:
     """Up to `width` windows of one kind (window_solver.py), and x (N+1, S, W), u (N, C, W), place (N, 6, W) of them."""
     of = windows[0].u.shape[1] - 1
     axes = next((many for many in AXES if many >= of), of)
-    counts = [len(one.u) for one in windows]
-    N = max(counts)
+    N = max(len(one.u) for one in windows)
     R = 8 * (axes - of) + max(one.limits.on.shape[1] for one in windows)
-
-    def stack(each: list[Any], fill: float = 0.0, rows: int = N) -> FloatArray:
-        """Numbers of all steps, those of lanes behind each other."""
-        out: FloatArray = np.full((rows, *np.shape(each[0])[1:], width), fill)
-        for lane, one in enumerate(each):
-            out[: len(one), ..., lane] = one
-        return out
-
-    def points(each: list[FloatArray], fill: float = 0.0, rows: int = N) -> FloatArray:
-        """`stack` (.., A), with the axes that the kernel has beside."""
-        return np.insert(stack(each, fill, rows), [of] * (axes - of), fill, axis=1)
-
-    def vectors(each: list[FloatArray]) -> FloatArray:
-        """`stack` (.., 3, A), of windows with bends."""
-        rows = stack(each) if bends else np.zeros((0, 3, of, width))
-        return np.insert(rows, [of] * (axes - of), 0.0, axis=2)
-
-    def limit(name: str, fill: float = 0.0) -> FloatArray:
-        return stack([getattr(one.limits, name) for one in windows], fill)
-
-    legs, leg = _legs_of(windows)
-    way, rate, shape = _formulas_of(legs)
-    square = (legs.drift**2).sum(axis=1)
-    start = legs.base + legs.radius[:, None] * legs.e1
-    passed = [one.limits.passed for one in windows]
-    bent = [(legs.radius[at] > 0.0) & ~now for at, now in zip(leg, passed, strict=True)]
-    bends = int(any(p.any() or b.any() for p, b in zip(passed, bent, strict=True)))
-    steps = place_of(of, axes)
-    on, own = np.zeros((N, R, width)), np.zeros((N, width))
+    bends = int(any(one.legs.radius.any() for one in windows))
+    vectors = (N * bends, 3, axes)
+    shapes = {
+        **dict.fromkeys(Group._fields, (N,)),
+        **dict.fromkeys(("base", "drift", "start", "switch_at", "side"), (N, axes)),
+        **{"on": (N, R), "target": vectors, "way": vectors, "rate": (N * bends,), "shape": (N * bends, 6)},
+        **{"per_box": (4, axes), "sag": (SETS,), "rest": (N, 2, axes), "aside": (1,)},
+    }
+    group = Group(*(np.full((*shapes[name], width), _FILL.get(name, 0.0)) for name in Group._fields))
+    x, u = np.zeros((N + 1, 3 * axes, width)), np.zeros((N, axes + 1, width))
+    u[:, axes] = 1.0
+    place = np.zeros((N, 3 * SETS, width))
     for lane, one in enumerate(windows):
-        there = one.limits.on
-        on[: len(there), rows_of(of, axes, there.shape[1]), lane] = there
-        own[: len(there), lane] = there[:, 8 * of + NORMAL_ROWS]
-    group = Group(
-        real=stack([np.ones(count) for count in counts]),
-        last=stack([np.arange(count) == count - 1 for count in counts]),
-        on=on,
-        base=points([legs.base[at] for at in leg]),
-        drift=points([legs.drift[at] for at in leg]),
-        start=points([start[at] for at in leg]),
-        per_drift=stack([1.0 / np.where(square > 0.0, square, 1.0)[at] for at in leg], 1.0),
-        length=stack([legs.length[at] for at in leg], 1.0),
-        line=stack([(legs.radius[at] == 0.0) & ~now for at, now in zip(leg, passed, strict=True)]),
-        bent=stack(bent),
-        passed=stack(passed),
-        target=vectors([one.limits.target for one in windows]),
-        way=vectors([way[at] for at in leg]),
-        rate=stack([rate[at] for at in leg]) if bends else np.zeros((0, width)),
-        shape=stack([shape[at] for at in leg]) if bends else np.zeros((0, 6, width)),
-        begins=stack([np.diff(at, prepend=-1) != 0 for at in leg]),
-        ends=stack([np.diff(at, append=-1) != 0 for at in leg]),
-        at_vertex=limit("at_vertex"),
-        per_box=points([1.0 / one.limits.box for one in windows], 1.0, 4),
-        room=1.0 / limit("room", 1.0) ** 2,
-        room_node=1.0 / limit("room_node", 1.0) ** 2,
-        sag=stack([one.limits.sag for one in windows], 0.0, SETS),
-        rest=np.insert(limit("rest"), [of] * (axes - of), 0.0, axis=2),
-        feed=limit("feed", 1.0) ** 2,
-        feed_node=1.0 / limit("feed_node", 1.0) ** 2,
-        normal=limit("normal", 1.0),
-        normal_node=1.0 / limit("normal_node", 1.0) ** 2,
-        bound=own,
-        turns=limit("turns"),
-        pace=limit("pace", 1.0),
-        per_h=1.0 / limit("h", 1.0),
-        h=limit("h", 1.0),
-        h_max=limit("h_max", 2.0),
-        h_min=limit("h_min", 0.5),
-        switch=stack([one.limits.switch / (one.limits.room_node * one.limits.pace) for one in windows]),
-        switch_at=points([one.limits.switch_at for one in windows]),
-        side=points([one.limits.side / one.limits.room_node[:, None] for one in windows]),
-        smooth=2.0 * limit("smooth") * limit("h"),
-        centre=limit("centre") * limit("h") * on[:, 8 * axes + TUBE_NODE],
-        per_step=1.0 / limit("step_max", 1.0),
-        aside=stack([np.array([one.limits.aside]) for one in windows], 0.0, 1),
-    )
-    first, normal = windows[0].limits, bool(own.any())
-    held = Held(first.laws, steps) if width == 1 else None
-    laws = len(first.laws.kind) > 0
+        legs, limits = one.legs, one.limits
+        of_legs = legs.length, legs.base, legs.drift, legs.e1, legs.radius
+        of_steps = tuple(getattr(limits, name) for name in _OF_STEPS)
+        put_window(group, lane, of_legs, _formulas_of(legs, bends), of_steps, limits.box, limits.sag)
+        put_motion((x, u, place), lane, (one.x, one.u, one.place))
+        group.aside[0, lane] = limits.aside
+    first, on = windows[0].limits, group.on
+    normal, laws = bool(group.bound.any()), len(first.laws.kind) > 0
+    held = Held(first.laws, place_of(of, axes)) if width == 1 else None
     which = (
         bends,
         normal or laws,
@@ -185,30 +139,111 @@ def group_of(
         laws,
         bool(on[:, 8 * axes + SWITCH].any()),
     )
-    x, u = np.zeros((N + 1, 3 * axes, width)), np.zeros((N, axes + 1, width))
-    u[:, axes] = 1.0
-    for lane, (one, count) in enumerate(zip(windows, counts, strict=True)):
-        x[: count + 1, steps[: 3 * of], lane] = one.x
-        x[count + 1 :, :axes, lane] = x[count, :axes, lane]
-        u[:count, steps[3 * of :] - 3 * axes, lane] = one.u
     sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R, *which)
-    return sizes, group, held, x, u, stack([one.place for one in windows])
+    return sizes, group, held, x, u, place
 
 
-def _legs_of(windows: list[StepWindow]) -> tuple[LegFormulas, list[Array]]:
-    """The legs of all windows, and those of the steps of each window among them."""
-    first = np.cumsum([0, *(len(one.legs.length) for one in windows)])
-    curves = np.cumsum([0, *(len(one.legs.weight) for one in windows)])
-    legs = LegFormulas(
-        *(np.concatenate([getattr(one.legs, name) for one in windows]) for name in LegFormulas._fields)
-    )
-    offset = np.repeat(curves[:-1], np.diff(first))
-    legs = legs._replace(curve=np.where(legs.curve >= 0, legs.curve + offset, -1))
-    return legs, [one.limits.leg + begin for one, begin in zip(windows, first[:-1], strict=True)]
+_OF_STEPS = (
+    *(
+        "leg",
+        "passed",
+        "at_vertex",
+        "on",
+        "turns",
+        "target",
+        "rest",
+        "switch_at",
+        "side",
+        "room",
+        "room_node",
+    ),
+    *("feed", "feed_node", "normal", "normal_node", "step_max", "pace", "h", "h_max", "h_min"),
+    *("switch", "smooth", "centre"),
+)
 
 
-def _formulas_of(legs: LegFormulas) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """`way`, `rate` and `shape` of legs (R, ..)."""
+@njit(cache=True, error_model="numpy")
+def put_window(group, lane, legs, formulas, steps, box, sag):
+    """The numbers of a window into its lane of a group.
+
+    legs     : length (R,), base (R, A), drift (R, A), e1 (R, A), radius (R,)
+    formulas : way (R, 3, A), rate (R,), shape (R, 6); without rows where no window has bends
+    steps    : `_OF_STEPS` of its limits
+    box      : (4, A) of its limits
+    sag      : (2,) of its limits
+    """
+    leg, passed, at_vertex, on, turns, target, rest, switch_at, side, room, room_node = steps[:11]
+    feed, feed_node, normal, normal_node, step_max, pace, h, h_max, h_min, switch, smooth, centre = steps[11:]
+    length, base, drift, e1, radius = legs
+    way, rate, shape = formulas
+    N, of, axes = len(leg), base.shape[1], group.base.shape[1]
+    first, kernel_first = 8 * of, 8 * axes
+    for k in range(of):
+        for m in range(4):
+            group.per_box[m, k, lane] = 1.0 / box[m, k]
+    for m in range(len(sag)):
+        group.sag[m, lane] = sag[m]
+    for i in range(N):
+        r, square = leg[i], 0.0
+        begins, ends = i == 0 or leg[i - 1] != r, i == N - 1 or leg[i + 1] != r
+        group.real[i, lane], group.last[i, lane] = 1.0, i == N - 1
+        for row in range(on.shape[1]):
+            at = row // of * axes + row % of if row < first else row - first + kernel_first
+            group.on[i, at, lane] = on[i, row]
+        for k in range(of):
+            square += drift[r, k] * drift[r, k]
+            group.base[i, k, lane], group.drift[i, k, lane] = base[r, k], drift[r, k]
+            group.start[i, k, lane] = base[r, k] + radius[r] * e1[r, k]
+            group.rest[i, 0, k, lane], group.rest[i, 1, k, lane] = rest[i, 0, k], rest[i, 1, k]
+            group.switch_at[i, k, lane], group.side[i, k, lane] = switch_at[i, k], side[i, k] / room_node[i]
+        group.per_drift[i, lane] = 1.0 / (square if square > 0.0 else 1.0)
+        group.length[i, lane] = length[r]
+        group.line[i, lane] = radius[r] == 0.0 and not passed[i]
+        group.bent[i, lane], group.passed[i, lane] = radius[r] > 0.0 and not passed[i], passed[i]
+        if len(way):
+            group.rate[i, lane] = rate[r]
+            for m in range(6):
+                group.shape[i, m, lane] = shape[r, m]
+            for m in range(3):
+                for k in range(of):
+                    group.target[i, m, k, lane], group.way[i, m, k, lane] = target[i, m, k], way[r, m, k]
+        group.begins[i, lane], group.ends[i, lane], group.at_vertex[i, lane] = begins, ends, at_vertex[i]
+        group.room[i, lane], group.room_node[i, lane] = (
+            1.0 / (room[i] * room[i]),
+            1.0 / (room_node[i] * room_node[i]),
+        )
+        group.feed[i, lane], group.feed_node[i, lane] = feed[i] * feed[i], 1.0 / (feed_node[i] * feed_node[i])
+        group.normal[i, lane], group.normal_node[i, lane] = normal[i], 1.0 / (normal_node[i] * normal_node[i])
+        group.bound[i, lane], group.turns[i, lane] = on[i, first + NORMAL_ROWS], turns[i]
+        group.pace[i, lane], group.h[i, lane], group.per_h[i, lane] = pace[i], h[i], 1.0 / h[i]
+        group.h_max[i, lane], group.h_min[i, lane] = h_max[i], h_min[i]
+        group.switch[i, lane] = switch[i] / (room_node[i] * pace[i])
+        group.smooth[i, lane] = 2.0 * smooth[i] * h[i]
+        group.centre[i, lane] = centre[i] * h[i] * on[i, first + TUBE_NODE]
+        group.per_step[i, lane] = 1.0 / step_max[i]
+
+
+@njit(cache=True, error_model="numpy")
+def put_motion(motion, lane, window):
+    """The x (N+1, S), u (N, C) and place (N, 6) of a window into its lane; behind its end it stands where that is."""
+    (x, u, place), (own_x, own_u, own_place) = motion, window
+    N, of, axes = len(own_u), own_u.shape[1] - 1, u.shape[1] - 1
+    for i in range(len(x)):
+        for k in range(of):
+            for m in range(3 if i <= N else 1):
+                x[i, m * axes + k, lane] = own_x[min(i, N), m * of + k]
+    for i in range(N):
+        u[i, axes, lane] = own_u[i, of]
+        for k in range(of):
+            u[i, k, lane] = own_u[i, k]
+        for k in range(place.shape[1]):
+            place[i, k, lane] = own_place[i, k]
+
+
+def _formulas_of(legs: LegFormulas, bends: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`way`, `rate` and `shape` of legs (R, ..); without rows where there are no `bends`."""
+    if not bends:
+        return np.zeros((0, 3, legs.base.shape[1])), np.zeros(0), np.zeros((0, 6))
     arms = legs.radius[:, None] * legs.e1, legs.radius[:, None] * legs.e2
     way, rate, shape = np.stack([legs.drift, *arms], axis=1), legs.rate.copy(), np.zeros((len(legs.rate), 6))
     curved = np.flatnonzero(legs.curve >= 0)

@@ -108,18 +108,19 @@ def together(parts: Sequence[LegShapes], axes: int) -> LegShapes:
     )
 
 
-def shapes_of(toolpath: Toolpath, row: Array, vertex: FloatArray) -> dict[str, FloatArray]:
+def shapes_of(toolpath: Toolpath, row: Array, ended: FloatArray) -> dict[str, FloatArray]:
     """The coefficients of the legs (`TubeRun`).
 
-    row    : (R,) the segments that the legs begin with
-    vertex : (R+1, A) [mm]
+    row   : (R,) the segments that the legs begin with
+    ended : (R, A) where they end [mm]
     """
     arc, arcs, curve = toolpath.arc[row], toolpath.arcs, np.flatnonzero(toolpath.curve[row] >= 0)
-    chord = np.diff(vertex, axis=0)
+    base = toolpath.start[row]
+    chord = ended - base
     length = np.where(toolpath.straight[row], np.linalg.norm(chord, axis=1), toolpath.length[row])
     shape = {
         "length": length,
-        "base": vertex[:-1].copy(),
+        "base": base,
         "drift": chord / length[:, None],
         "e1": np.zeros_like(chord),
         "e2": np.zeros_like(chord),
@@ -145,19 +146,20 @@ def word_shares(toolpath: Toolpath) -> tuple[Array, FloatArray]:
     return by, share / path_per_length(toolpath.axes, toolpath.radius, toolpath)
 
 
+def with_words(toolpath: Toolpath, row: Array, of: tuple[Array, FloatArray]) -> Array:
+    """(R,) on which of the legs that the segments `row` (R,) stand for, from `word_shares`, F is a limit of its own."""
+    return np.asarray(np.isfinite(toolpath.feed[row]) & (of[1][row] < 1.0 - ROUNDING))
+
+
 def words_of(
     toolpath: Toolpath, row: Array, of: tuple[Array, FloatArray]
 ) -> tuple[FloatArray, FloatArray, str]:
-    """`word` (R, W) and `counts` of the legs that the segments `row` (R,) stand for, over all axes, from
-    `word_shares`; and why no motion can be looked for. Inside the tolerance x, y and z may take what the
-    rotary axes need not, so that F is a limit of its own; it has to be of the same axes everywhere, and to
-    change with the feed in all of them."""
+    """`word` (R, 1) and `counts` of the legs of a run with such legs, over all axes; and why no motion can be looked for. Inside
+    the tolerance x, y and z may take what the rotary axes need not, so that F is a limit of its own; it has to be of the same
+    axes everywhere, and to change with the feed in all of them."""
     groups, by, share = feed_groups(toolpath.axes), of[0][row], of[1][row]
     feed, finite = toolpath.feed[row], np.isfinite(toolpath.feed[row])
-    every = np.ones(len(groups))
-    if not (finite & (share < 1.0 - ROUNDING)).any():
-        return np.empty((len(row), 0)), every, ""
-    word = (feed * share)[:, None]
+    every, word = np.ones(len(groups)), (feed * share)[:, None]
     if len(np.unique(by[finite])) > 1:
         return word, every, "F goes by other axes from block to block"
     if (np.sign(np.diff(feed, prepend=feed[0])) * word_change(word) < 0.0).any():

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.base.arrays import FloatArray
+from planner.base.kernels import njit
 from planner.joint.guess import Guess
 from planner.joint.own_laws import Where, motion_at
 from planner.joint.run import TubeRun
@@ -17,6 +18,8 @@ from planner.joint.run import TubeRun
 # Steps between two nodes that a motion is made to meet: gaps of the kinematics add up over them, with their
 # square from acceleration to position. (Over the 1,500 of a window gaps of 1e-10 mean steps became 1e-4.)
 CLOSED_EVERY = 50
+# Of what a jerk moves a motion by at the end, what is left beside what others do that counts as rounding [-].
+DEPENDENT = 1e-14
 # Places in every step at which the normal acceleration is measured [fraction of the step]; between them it is
 # above by less than 1e-6.
 MEASURED_AT = np.linspace(0.0, 1.0, 257)
@@ -52,58 +55,85 @@ def steps_of(run: TubeRun, guess: Guess, h: FloatArray, jerk: FloatArray) -> Ste
     return Steps(h=h * by, position=p, velocity=v / by, acceleration=a / by**2, jerk=jerk / by**3)
 
 
-def integrated(begin: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
+@njit(cache=True, error_model="numpy")
+def integrated(begin, h, jerk):
     """(N+1, 3, A) position, velocity and acceleration at the nodes, from those at the first one, begin (3, A)
-    [mm, s]. Of several motions at once with further dimensions before these.
+    [mm, s].
 
     h    : (N,) durations [s]
     jerk : (N, A) constant on each step [mm/s3]
     """
-    h, p, v, a = h[..., None], *np.moveaxis(begin[..., None, :, :], -2, 0)
-    a = _summed(a, h * jerk)
-    v = _summed(v, h * (a[..., :-1, :] + h * jerk / 2))
-    p = _summed(p, h * (v[..., :-1, :] + h * (a[..., :-1, :] / 2 + h * jerk / 6)))
-    return np.stack([p, v, a], axis=-2)
+    N, axes = jerk.shape
+    found = np.empty((N + 1, 3, axes))
+    for k in range(axes):
+        p, v, a = 0.0, 0.0, 0.0  # sums, rounded by themselves
+        for i in range(N + 1):
+            found[i, 0, k], found[i, 1, k], found[i, 2, k] = begin[0, k] + p, begin[1, k] + v, begin[2, k] + a
+            if i < N:
+                p += h[i] * (found[i, 1, k] + h[i] * (found[i, 2, k] / 2.0 + h[i] * jerk[i, k] / 6.0))
+                v += h[i] * (found[i, 2, k] + h[i] * jerk[i, k] / 2.0)
+                a += h[i] * jerk[i, k]
+    return found
 
 
-def _summed(begin: FloatArray, change: FloatArray) -> FloatArray:
-    """(.., N+1, A) begin (.., 1, A) and the sums of the changes (.., N, A) after it."""
-    return np.concatenate([begin, begin + np.cumsum(change, axis=-2)], axis=-2)
-
-
-def closed(begin: FloatArray, end: FloatArray, h: FloatArray, jerk: FloatArray) -> FloatArray:
+@njit(cache=True, error_model="numpy")
+def closed(begin, end, h, jerk):
     """(N, A) jerks that lead from `begin` (3, A) to `end` (3, A), position, velocity and acceleration: those
-    given, changed least. Of several motions at once with further dimensions before these.
+    given, changed least. Fewer than three steps meet the first of these.
 
-    h    : (N,) durations [s], of which some may be 0
+    h    : (N,) durations [s]
     jerk : (N, A) [mm/s3]
     """
-    lasts = h.sum(axis=-1)[..., None]
-    rest = (lasts - np.cumsum(h, axis=-1)) / lasts  # after each step, in units of the whole time
-    own = h / lasts
-    to_end = np.stack(
-        [own * (own**2 / 6 + rest * (own / 2 + rest / 2)), own * (own / 2 + rest), own], axis=-2
-    )  # of p, v, a, in those units
-    missed = (integrated(begin, h, jerk)[..., -1, :, :] - end) / lasts[..., None] ** [[3.0], [2.0], [1.0]]
-    return jerk - np.linalg.pinv(to_end) @ missed
+    N, axes, lasts, done = len(h), jerk.shape[1], h.sum(), 0.0
+    # of p, v, a at the end by every jerk, in units of the whole time; then orthogonal to one another, `of` (3, 3) them
+    to_end, of = np.empty((3, N)), np.zeros((3, 3))
+    for i in range(N):
+        done += h[i]
+        own, rest = h[i] / lasts, (lasts - done) / lasts
+        to_end[0, i] = own * (own * own / 6.0 + rest * (own / 2.0 + rest / 2.0))
+        to_end[1, i], to_end[2, i] = own * (own / 2.0 + rest), own
+    for m in range(3):
+        whole = np.sqrt((to_end[m] * to_end[m]).sum())
+        for _ in range(2):  # once leaves rounding of what is taken off
+            for n in range(m):
+                along = (to_end[n] * to_end[m]).sum()
+                of[m, n] += along
+                to_end[m] -= along * to_end[n]
+        left = np.sqrt((to_end[m] * to_end[m]).sum())
+        if left > DEPENDENT * whole:
+            of[m, m] = left
+            to_end[m] /= left
+        else:
+            to_end[m] = 0.0
+    found, last = jerk.copy(), integrated(begin, h, jerk)[N]
+    for k in range(axes):
+        y = np.zeros(3)
+        for m in range(3):
+            missed = (last[m, k] - end[m, k]) / lasts ** (3 - m)
+            for n in range(m):
+                missed -= of[m, n] * y[n]
+            y[m] = missed / of[m, m] if of[m, m] > 0.0 else 0.0
+        for i in range(N):
+            found[i, k] -= to_end[0, i] * y[0] + to_end[1, i] * y[1] + to_end[2, i] * y[2]
+    return found
 
 
-def closed_at_nodes(state: FloatArray, h: FloatArray, jerk: FloatArray) -> tuple[FloatArray, FloatArray]:
+@njit(cache=True, error_model="numpy", nogil=True)
+def closed_at_nodes(state, h, jerk):
     """The motion that meets every `CLOSED_EVERY`th of the nodes, state (N+1, 3, A), and the last one: its
     nodes, and the jerks (N, A), those given changed least between two of them.
 
     h    : (N,) durations [s]
     jerk : (N, A) [mm/s3]
     """
-    ends = np.linspace(0, len(h), max(len(h) // CLOSED_EVERY, 1) + 1).astype(int)
-    begin, steps = ends[:-1], np.diff(ends)
-    number = np.arange(steps.max())
-    there = number < steps[:, None]
-    of = np.minimum(begin[:, None] + number, len(h) - 1)
-    lasting = np.where(there, h[of], 0.0)  # a step of no duration stands for one that is not there
-    jerks = closed(state[begin], state[ends[1:]], lasting, jerk[of])
-    nodes = integrated(state[begin], lasting, jerks)[:, :-1]
-    return np.concatenate([nodes[there], state[-1:]]), jerks[there]
+    N, parts, lo = len(h), max(len(h) // CLOSED_EVERY, 1), 0
+    nodes, jerks = state.copy(), np.empty_like(jerk)
+    for part in range(1, parts + 1):
+        hi = N if part == parts else int(part * (N / parts))
+        jerks[lo:hi] = closed(state[lo], state[hi], h[lo:hi], jerk[lo:hi])
+        nodes[lo:hi] = integrated(state[lo], h[lo:hi], jerks[lo:hi])[: hi - lo]
+        lo = hi
+    return nodes, jerks
 
 
 def _largest_square(v: FloatArray, middle: FloatArray, after: FloatArray, counts: FloatArray) -> FloatArray:

@@ -23,7 +23,6 @@ iteration, so that steps stay where the linear model holds.
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import anywhere, larger, magnitude, root, where
 from planner.base.views import matrix, size
@@ -37,20 +36,24 @@ THIRD = 1.0 / 3.0
 STAY, STAY_PRICED = 0.1, 0.3
 SLOW = 0.1  # of what a step changes the velocity by: no speed counts as less there [-]
 TURNED = 1.0  # turn from which on a step turns far [rad]
+COS_TURNED = float(np.cos(TURNED))
 LEAST = (
     0.1  # of the speeds at the ends: less is not kept of d, which falls below 0 where a step turns back [-]
 )
 
 
-def turns_far(velocity: FloatArray) -> Array:
+@njit(cache=True, error_model="numpy")
+def turns_far(velocity):
     """(N,) whether steps turn far, by the `velocity` (N+1, A) at the nodes; at rest the direction is the last one
     before."""
-    moving = velocity.any(axis=1)
-    last = np.maximum.accumulate(np.where(moving, np.arange(len(velocity)), 0))
-    way = velocity[last]
-    speed = np.linalg.norm(way, axis=1)
-    along = (way[:-1] * way[1:]).sum(axis=1)
-    far: Array = (speed[:-1] > 0.0) & (along < np.cos(TURNED) * speed[:-1] * speed[1:])
+    far, last = np.zeros(len(velocity) - 1, np.bool_), 0
+    for i in range(1, len(velocity)):
+        before, last = last, i if (velocity[i] != 0.0).any() else last
+        along, square, next_square = 0.0, 0.0, 0.0
+        for k in range(velocity.shape[1]):
+            v, w = velocity[before, k], velocity[last, k]
+            along, square, next_square = along + v * w, square + v * v, next_square + w * w
+        far[i - 1] = square > 0.0 and along < COS_TURNED * np.sqrt(square) * np.sqrt(next_square)
     return far
 
 

@@ -21,12 +21,11 @@ import numpy as np
 from planner.base.arrays import Array, FloatArray
 from planner.base.sizes import SIZES
 from planner.feedrate.solution import Status
-from planner.joint.checks import Keeps, chord_means, worst_shares
+from planner.joint.checks import chord_means, worst_shares
 from planner.joint.groups import Search, Sweep, Task, searched
 from planner.joint.guess import CutMotion, Guess, unit_of
 from planner.joint.interior_point import Tuning
 from planner.joint.law_window import NEAR, Window, near
-from planner.joint.legs import LegFormulas
 from planner.joint.motion import Steps, closed_at_nodes
 from planner.joint.nlp import PULL
 from planner.joint.outcome import TubeSolution
@@ -137,7 +136,7 @@ class _Search:
         self.kept = np.ones(len(guess), dtype=bool)
         self.price = np.zeros((len(guess), columns(run)))
         self.iterations, self.windows, self.undivided = list[int](), 0, list[bool]()
-        self._keeps = keeps_of(run)
+        self._keeps = run.keeps
         self._begun = guess
         self._done, self._all = list[int](), len(guess)  # steps of all windows
 
@@ -336,12 +335,3 @@ class _Search:
         state = np.concatenate([guess.state[before], state, guess.state[hi + 1 : hi + 1 + JOIN_WITHIN]])
         jerk = np.concatenate([self.jerk[before], jerk, self.jerk[behind]])
         return switches_missed(self.run, leg, h, state, jerk, slice(lo - first, hi - first))
-
-
-def keeps_of(run: TubeRun) -> Keeps:
-    """The limits of the run, for the kernel."""
-    formula = ("length", "base", "drift", "e1", "e2", "radius", "rate", "curve")
-    same = ("velocity", "acceleration", "jerk", "feed", "budget", "curvature", "vertex_budget", "passed")
-    of_legs, of_run = ({name: getattr(run, name) for name in names} for names in (formula, same))
-    legs = LegFormulas(**of_legs, points=run.curves.points, weight=run.curves.weight)
-    return Keeps(legs=legs, normal=run.across_max, lag=run.lag, chord=run.chord, **of_run)

@@ -6,7 +6,6 @@ they meet.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -19,7 +18,7 @@ from planner.feedrate.solution import Status
 from planner.geometry.toolpath import Toolpath
 from planner.joint.motion import Steps
 from planner.joint.run import TubeRun
-from planner.motion.axis_motion import AxisMotion
+from planner.motion.axis_motion import AxisMotion, Pieces
 from planner.motion.timing import MotionInTime
 from planner.motion.trajectory import Trajectory
 
@@ -43,20 +42,6 @@ class SplicedRun:
     def lasting(self) -> float:
         """How long it takes, with the standstill [s]."""
         return self.end - self.begin + self.hold
-
-
-def _columns(motion: MotionInTime, times: FloatArray) -> dict[str, Array]:
-    """Those of the motion at ascending times (T,). A trajectory of each of thousands of runs would take longer to be
-    checked than to be evaluated."""
-    if isinstance(motion, AxisMotion):
-        return motion.columns(times)
-    seen = motion.at(times, 1.0)
-    return {name: getattr(seen, name) for name in ("position", "block", "line", *RATES)}
-
-
-def _length(motion: MotionInTime, times: FloatArray) -> FloatArray:
-    """(T,) arc length of the motion at ascending times (T,) [mm]."""
-    return motion.length(times) if isinstance(motion, AxisMotion) else motion.at(times, 1.0).s
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -93,53 +78,84 @@ class Spliced:
     @cached_property
     def _own_length(self) -> FloatArray:
         """(n, 2) arc length in the motion of each run where that begins and ends [mm]."""
-        return np.array([_length(run.motion, np.array([run.begin, run.end])) for run in self.runs])
+        begin, end, _ = self._times
+        k = np.repeat(np.arange(len(self.runs)), 2)
+        return self._own_lengths(k, np.stack([begin, end], axis=1).ravel()).reshape(-1, 2)
+
+    @cached_property
+    def _times(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n,) when the runs begin and end in their motions, and the last time that they are asked for [s]: of one that is
+        moving there rounding of times must not reach its end, which belongs to the next one."""
+        begin, end = np.array([(run.begin, run.end) for run in self.runs]).T
+        moving = np.array([run.moving for run in self.runs])
+        return begin, end, np.where(moving, np.nextafter(end, begin), np.inf)
+
+    @cached_property
+    def _pieces(self) -> tuple[Array, Pieces | None]:
+        """(n,) which runs are given axis by axis, and their pieces, None where there is none."""
+        motions = [run.motion if isinstance(run.motion, AxisMotion) else None for run in self.runs]
+        by_axes = np.array([one is not None for one in motions])
+        return by_axes, Pieces.of(motions) if by_axes.any() else None
+
+    @cached_property
+    def _s(self) -> FloatArray:
+        """Arc lengths of `_pieces` (`Pieces.length`) [mm]."""
+        return np.concatenate([run.motion.s for run in self.runs if isinstance(run.motion, AxisMotion)])
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation
         period."""
-        seen = [self._seen(*part) for part in self._parts(times)]
-        columns: dict[str, Any] = {name: np.concatenate([one[name] for one in seen]) for name in seen[0]}
+        of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
+        begin, end, last = self._times
+        local = np.minimum(begin[of] + (times - self.begin[of]), last[of])
+        columns = self._seen(of, np.minimum(local, end[of]))
+        columns["s"] = partial(self._lengths, of, np.minimum(local, end[of]))
+        over = local >= end[of]  # there another motion may begin
+        for name in RATES:
+            columns[name][over] = 0.0
         one = self.runs[0].motion.at(np.array([self.runs[0].begin]), dt)
-        columns["s"] = partial(self._lengths, times)
         return dataclasses.replace(one, t=times, **columns)
 
-    def _parts(self, times: FloatArray) -> Iterator[tuple[int, FloatArray, FloatArray, Array | slice]]:
-        """The runs at ascending times (T,): number of the run, times in its motion, which may be behind its end, those of
-        them that differ, ascending and not behind it, and which of these each is."""
-        of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
-        edges = np.append(np.flatnonzero(np.diff(of, prepend=-1)), len(of))
-        # Without times there are the columns of the first run, without rows.
-        for lo, hi in list(pairwise(edges.tolist())) or [(0, 0)]:
-            k = int(of[lo]) if hi else 0
-            run = self.runs[k]
-            local = run.begin + (times[lo:hi] - self.begin[k])
-            if run.moving:  # rounding of times: its end belongs to the next one
-                local = np.minimum(local, np.nextafter(run.end, run.begin))
-            single = np.minimum(local, run.end)
-            which: Array | slice = slice(None)
-            if not (np.diff(single) > 0.0).all():
-                single, which = np.unique(single, return_inverse=True)
-            yield k, local, single, which
+    def _lengths(self, of: Array, times: FloatArray) -> FloatArray:
+        """(T,) arc length [mm], as `_seen`."""
+        return self.length[of] + self._own_lengths(of, times) - self._own_length[of, 0]
 
-    def _lengths(self, times: FloatArray) -> FloatArray:
-        """(T,) arc length at ascending times (T,) [mm]."""
-        return np.concatenate(
-            [
-                self.length[k] + _length(self.runs[k].motion, single)[which] - self._own_length[k, 0]
-                for k, _, single, which in self._parts(times)
-            ]
-        )
+    def _own_lengths(self, of: Array, times: FloatArray) -> FloatArray:
+        """(T,) arc length in the motion of each run [mm], as `_seen`."""
+        by_axes, pieces = self._pieces
+        here, found = by_axes[of], np.empty(len(of))
+        if pieces is not None:
+            found[here] = pieces.length(self._s, of[here], times[here])
+        for k in np.unique(of[~here]).tolist():
+            part = slice(*np.searchsorted(of, [k, k + 1]).tolist())
+            single, which = np.unique(times[part], return_inverse=True)
+            found[part] = self.runs[k].motion.at(single, 1.0).s[which]
+        return found
 
-    def _seen(self, k: int, local: FloatArray, single: FloatArray, which: Array | slice) -> dict[str, Array]:
-        """The columns of the motion of run k, as `_parts` has them."""
-        run = self.runs[k]
-        columns = {name: column[which] for name, column in _columns(run.motion, single).items()}
-        over = local >= run.end  # there another motion may begin
-        if over.any():
-            for name in RATES:
-                columns[name] = columns[name].copy()
-                columns[name][over] = 0.0
+    def _seen(self, of: Array, times: FloatArray) -> dict[str, Any]:
+        """The columns of the motions of the runs `of` (T,), ascending, at their times (T,), ascending too."""
+        by_axes, pieces = self._pieces
+        here = by_axes[of]
+        parts: list[tuple[Array | slice, dict[str, Any]]] = []
+        if pieces is not None:
+            parts.append((here, pieces.at(of[here], times[here])))
+        others = np.unique(of[~here]).tolist()
+        if not (others or parts):  # without times there are the columns of the first run, without rows
+            others = [0]
+        for k in others:
+            part = slice(*np.searchsorted(of, [k, k + 1]).tolist())
+            single, which = np.unique(times[part], return_inverse=True)
+            seen = self.runs[k].motion.at(single, 1.0)
+            names = ("position", "block", "line", *RATES)
+            parts.append((part, {name: getattr(seen, name)[which] for name in names}))
+        if len(parts) == 1:  # most motions are found as a whole, or kept
+            return parts[0][1]
+        columns: dict[str, Any] = {}
+        for at, found in parts:
+            for name, column in found.items():
+                if name not in columns:
+                    columns[name] = np.zeros((len(of), *column.shape[1:]), column.dtype)
+                columns[name][at] = column
         return columns
 
     def whole(self) -> AxisMotion:

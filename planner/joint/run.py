@@ -24,31 +24,26 @@ An arc or a curve that bends with a radius below the tolerance is passed (`TubeR
 places, one after the other, and take as little time as they want to.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
-from planner.corners.budget import chord_rate, filter_rate, largest_normal
-from planner.feedrate.constraints.limits import JERK, Limits
-from planner.geometry.toolpath import Joint, Toolpath
+from planner.joint.checks import Keeps
 from planner.joint.laws import PUSH
-from planner.joint.leg_shapes import LegShapes, edges_of, shapes_of, word_change, word_shares, words_of
-from planner.joint.own_laws import RunLaws, laws_of
-from planner.machine import Machine
-from planner.machine.user_limit import QUANTITIES
+from planner.joint.leg_shapes import (
+    LegShapes,
+    word_change,
+)
+from planner.joint.legs import LegFormulas
+from planner.joint.own_laws import RunLaws
+from planner.joint.step_limits import OfRun
 
 # Fraction of the budget that a step on an arc or a curve may use for what that is off its own cubic [-], and
 # the largest angle that it turns by meanwhile [rad], within which tangents tell where a control point belongs.
 ARC_FRACTION, TURN_MAX = 0.005, 0.5
-# Of a limit, how far below it a run begins or ends in motion at most [-]: rows are narrowed by 2e-6 (problem.py), and where both
-# ends are at the feed nothing else is left for a search to be in.
-BELOW = 4e-6
 STRAIGHT = 1e-6  # differences of directions that count as one [-]
-_AS_IT_IS = np.array([[0.0, 1.0]])  # `TubeRun.lag` without filters
 # Without limits of the jerk the scale of steps, as a share of the time in which the full acceleration moves an
 # axis by the budget [-]: finer ones take more steps and end hardly sooner.
 SHARP = 0.25
@@ -146,6 +141,35 @@ class TubeRun(LegShapes):
         return np.where(self.curvature > 0, self.budget - ARC_FRACTION * self.budget, self.budget)
 
     @cached_property
+    def off_by_jerk(self) -> float:
+        """How far chords that pass a place at another share than the middle are off by jerk (numbers.py) [mm]."""
+        # without limits nothing is known of it
+        jerk = np.linalg.norm(self.jerk) if np.isfinite(self.jerk).all() else 0.0
+        return float(jerk) * self.chord**3 / 6.0
+
+    @cached_property
+    def of_steps(self) -> OfRun:
+        """What the limits of steps are made of, for their kernel."""
+        names = "room vertex_budget vertex offset feed across_max curvature step_max switch passed"
+        return OfRun(
+            **{name: getattr(self, name) for name in names.split()},
+            by_jerk=self.off_by_jerk,
+            fastest=float(np.linalg.norm(self.velocity)),
+            strongest=float(np.linalg.norm(self.acceleration)),
+            slowest=float(self.velocity.min()),
+            jerky=bool(np.isfinite(self.jerk).all()),
+        )
+
+    @cached_property
+    def keeps(self) -> Keeps:
+        """The limits of steps, for the kernels that look at them."""
+        formula = ("length", "base", "drift", "e1", "e2", "radius", "rate", "curve")
+        same = ("velocity", "acceleration", "jerk", "feed", "budget", "curvature", "vertex_budget", "passed")
+        of_legs, of_run = ({name: getattr(self, name) for name in names} for names in (formula, same))
+        legs = LegFormulas(**of_legs, points=self.curves.points, weight=self.curves.weight)
+        return Keeps(legs=legs, normal=self.across_max, lag=self.lag, chord=self.chord, **of_run)
+
+    @cached_property
     def switch(self) -> FloatArray:
         """(R,) what the feed does where each leg begins: 1 where it falls, -1 where it rises, 0 where no
         motion is so fast."""
@@ -195,111 +219,3 @@ class TubeRun(LegShapes):
     def leg_at(self, place: FloatArray) -> Array:
         """(n,) legs at the places `place` (n,) along the run [mm]."""
         return np.clip(np.searchsorted(self.offset, place, side="right") - 1, 0, len(self) - 1)
-
-
-def tube_runs_of(toolpath: Toolpath, machine: Machine, *, jerk_limited: bool = True) -> Iterator[TubeRun]:
-    """The runs between full stops, in order; without limits of the jerk if it is not `jerk_limited`. Raises
-    InputError if the machine lacks an axis of the toolpath."""
-    limits = Limits.of(machine, toolpath.axes)
-    edges = edges_of(toolpath)
-    stops = np.flatnonzero(toolpath.joint[edges] == Joint.STOP)
-    (of_legs, of_vertices), shares = budgets_of(toolpath, edges), word_shares(toolpath)
-    sag, chord = filter_rate(machine) + chord_rate(machine), float(np.sqrt(2.0 * chord_rate(machine)))
-    normal, lag = largest_normal(machine), _lag(machine)
-    ends, feeds = toolpath.velocities, toolpath.feed[[0, -1]]
-    share = np.maximum(np.array(toolpath.speeds) / feeds, (np.abs(ends) / limits.velocity).max(axis=1))
-    ends /= np.maximum(share / (1.0 - BELOW), 1.0)[:, None]
-    for begin, end in pairwise(stops.tolist()):
-        first = edges[begin : end + 1]
-        row = first[:-1]  # the segment that stands for its leg
-        vertex_budget = of_vertices[begin : end + 1].copy()
-        vertex_budget[[0, -1]] = 0.0
-        vertex = np.vstack([toolpath.start[row], toolpath.end[first[-1] - 1]])
-        shape = shapes_of(toolpath, row, vertex)
-        curved = toolpath.curve[row] >= 0
-        curves = toolpath.curves.part(toolpath.curve[row][curved])
-        moves = (
-            np.abs(shape["drift"]) + shape["radius"][:, None] * (np.abs(shape["e1"]) + np.abs(shape["e2"]))
-        ).any(axis=0) | np.ptp(curves.points, axis=1).any(axis=0)
-        # chords of a motion along a line, and its mean, are on it: what they are ahead or behind by is no distance
-        straight = (
-            not (curved.any() or shape["radius"].any()) and np.ptp(shape["drift"], axis=0).max() < STRAIGHT
-        )
-        held = normal < np.linalg.norm(limits.acceleration[moves]) * (1 - 1e-12)
-        word, counts, differs = words_of(toolpath, row, shares)
-        yield TubeRun(
-            axis=np.flatnonzero(moves),
-            left=_kept_as_it_is(toolpath, slice(first[0], first[-1])) or differs,
-            word=word,
-            counts=counts[moves],
-            first=first,
-            curvature=toolpath.curvature[row],
-            curve=np.where(curved, np.cumsum(curved) - 1, -1),
-            curves=replace(curves, points=curves.points[:, :, moves]),
-            budget=of_legs[begin:end],
-            feed=toolpath.feed[row],
-            across_max=np.full(len(row), normal if held else np.inf),
-            vertex=vertex[:, moves],
-            vertex_budget=vertex_budget,
-            ends=ends[:, moves] * [[begin == 0], [end == len(edges) - 1]],
-            sag=0.0 if straight else sag,
-            lag=_AS_IT_IS if straight else lag,
-            chord=0.0 if straight else chord,
-            velocity=limits.velocity[moves],
-            acceleration=limits.acceleration[moves],
-            jerk=np.where(jerk_limited, limits.jerk[moves], np.inf),
-            laws=_laws(toolpath, limits, moves, first, (word, counts), jerk_limited),
-            **{name: value[:, moves] if value.ndim == 2 else value for name, value in shape.items()},
-        )
-
-
-def _kept_as_it_is(toolpath: Toolpath, run: slice) -> str:
-    """Why the motion along a run has to be that on the path, "" if it has not."""
-    if toolpath.held[run].any():
-        return "a thread is cut in step with the spindle"
-    return "G61 asks for the exact path" if toolpath.exact[run].any() else ""
-
-
-def _laws(
-    toolpath: Toolpath,
-    limits: Limits,
-    moves: Array,
-    first: Array,
-    words: tuple[FloatArray, FloatArray],
-    jerk_limited: bool,
-) -> RunLaws:
-    """The laws of the run over the segments first[0] : first[-1], on which the axes in `moves` (all,) move;
-    words: `TubeRun.word`, and `counts` over all axes."""
-    segments = slice(first[0], first[-1])
-    return RunLaws(
-        laws=tuple(
-            law
-            for law in laws_of(limits, moves, bool(words[0].shape[1]), words[1])
-            if jerk_limited or law.limit is None or QUANTITIES[law.quantity] != JERK.name
-        ),
-        axes=toolpath.axes,
-        axis=np.flatnonzero(moves),
-        still=toolpath.start[first[0]],
-        word=words[0],
-        edges=np.cumsum(toolpath.length[segments])[:-1],
-        block=toolpath.block[segments],
-    )
-
-
-def _lag(machine: Machine) -> FloatArray:
-    """`TubeRun.lag`: every filter is the mean over its length, here by Gauss at three places."""
-    places, weights = np.polynomial.legendre.leggauss(3)
-    later, share = np.zeros(1), np.ones(1)
-    for length in machine.fir.time_constants if machine.fir else ():
-        later = np.add.outer(later, length / 2.0 * places).ravel()
-        share = np.outer(share, weights / 2.0).ravel()
-    return np.column_stack([later, share])
-
-
-def budgets_of(toolpath: Toolpath, first: Array) -> tuple[FloatArray, FloatArray]:
-    """The tolerances (R,) of legs that hold the segments first[r] : first[r+1], first (R+1,), and those (R+1,) of the
-    vertices around them, as all tolerances beside them allow [mm]."""
-    row = first[:-1]  # the segment that stands for its leg
-    leg = np.maximum(toolpath.tolerance[row], toolpath.tolerance[row + 1])
-    beside = np.minimum(np.append(leg, np.inf), np.append(np.inf, leg))
-    return leg, np.minimum(toolpath.tolerance[first], beside)

@@ -11,13 +11,13 @@ with the laws tightened by what they were exceeded by.
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 from planner.joint.guess import CutMotion, Guess
+from planner.joint.legs import nearest_point
 from planner.joint.motion import Steps
 from planner.joint.own_laws import Where, motion_at
 from planner.joint.run import TubeRun
 from planner.machine.user_limit import QUANTITIES
-
-NEAREST_STEPS = 3  # Gauss-Newton steps to the nearest place on an arc, from the node's
 
 
 def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatArray:
@@ -27,40 +27,57 @@ def shares(run: TubeRun, steps: Steps, leg: Array, place: FloatArray) -> FloatAr
     leg   : (N,) of each step
     place : (N+1,) of the nodes along the run [mm]
     """
-    h, p, v, a, j = steps.h[:, None], steps.position, steps.velocity, steps.acceleration, steps.jerk
-    speed, push = v + h * (a / 2 + h * j / 8), a + h * j / 2
-    square = (speed**2).sum(axis=1)
-    across = push - ((speed * push).sum(axis=1) / np.maximum(square, 1e-30))[:, None] * speed
-    local = place[:-1] - run.offset[leg]
-    controls = np.concatenate([p, p + h * v / 3, p + h * (2 * v / 3 + h * a / 6)])
-    far = _distance(run, np.tile(leg, 3), controls, np.tile(local, 3)).reshape(3, -1)
-    used = far.max(axis=0) / run.room[leg]
-    begins = np.flatnonzero(np.diff(leg, prepend=leg[0]) > 0)
-    vertex = leg[begins]
-    at = np.linalg.norm(p[begins] - run.vertex[vertex], axis=1) / run.vertex_budget[vertex]
-    used[begins] = np.maximum(used[begins], at)
+    motion, axes = (steps.position, steps.velocity, steps.acceleration, steps.jerk), len(run.axis)
+    used = _shares(run.keeps, run.room, run.vertex, leg, steps.h, motion, place[:-1] - run.offset[leg])
+    if not len(run.laws):
+        return np.asarray(used)
+    h, (p, v, a, j) = steps.h[:, None], motion
+    used[:, 3 * axes] = np.maximum(used[:, 3 * axes], run.word_share(leg, v + h * (a / 2 + h * j / 8)))
     state = np.stack([p, v, a], axis=1)
     laws = run.laws.shares(Where(leg, (place[:-1] + place[1:]) / 2.0), motion_at(state, j, steps.h / 2.0))
-    return np.column_stack(
-        [
-            np.abs(j) / run.jerk,
-            np.abs(push) / run.acceleration,
-            np.abs(speed) / run.velocity,
-            np.maximum(np.sqrt(square) / run.feed[leg], run.word_share(leg, speed)),
-            np.linalg.norm(across, axis=1) / run.across_max[leg],
-            used,
-            laws[:, run.laws.named],
-        ]
+    return np.column_stack([used, laws[:, run.laws.named]])
+
+
+@njit(cache=True, error_model="numpy")
+def _shares(keeps, room, vertex, leg, h, motion, x):
+    """`shares` (N, 3 A + 3) but for laws; room (R,), vertex (R+1, A) of the run, x (N,) places of the nodes on their legs."""
+    p, v, a, j = motion
+    N, axes = p.shape
+    found = np.zeros((N, 3 * axes + 3))
+    control, point, tangent, speed, push = (
+        *(np.empty(axes), np.empty(axes), np.empty(axes)),
+        *(np.empty(axes), np.empty(axes)),
     )
-
-
-def _distance(run: TubeRun, leg: Array, point: FloatArray, x: FloatArray) -> FloatArray:
-    """(N,) distances of points (N, A) from their legs, from places x (N,) near the nearest ones [mm]."""
-    for _ in range(NEAREST_STEPS if run.radius.any() else 1):
-        along = run.tangents(leg, x)
-        x = x + ((point - run.points(leg, x)) * along).sum(axis=1) / (along**2).sum(axis=1)
-        x = np.clip(x, 0.0, run.length[leg])
-    return np.asarray(np.linalg.norm(point - run.points(leg, x), axis=1))
+    for i in range(N):
+        r, used = leg[i], found[i]
+        square, along, across, off = 0.0, 0.0, 0.0, 0.0
+        for k in range(axes):
+            speed[k] = v[i, k] + h[i] * (a[i, k] / 2.0 + h[i] * j[i, k] / 8.0)
+            push[k] = a[i, k] + h[i] * j[i, k] / 2.0
+            square, along = square + speed[k] * speed[k], along + speed[k] * push[k]
+            used[k] = abs(j[i, k]) / keeps.jerk[k]
+            used[axes + k] = abs(push[k]) / keeps.acceleration[k]
+            used[2 * axes + k] = abs(speed[k]) / keeps.velocity[k]
+            off += (p[i, k] - vertex[r, k]) ** 2
+        for k in range(axes):
+            across += (push[k] - along / max(square, 1e-30) * speed[k]) ** 2
+        used[3 * axes] = np.sqrt(square) / keeps.feed[r]
+        used[3 * axes + 1] = np.sqrt(across) / keeps.normal[r]
+        for m in range(3):
+            apart = 0.0
+            for k in range(axes):
+                control[k] = p[i, k]
+                if m == 1:
+                    control[k] += h[i] * v[i, k] / 3.0
+                elif m == 2:
+                    control[k] += h[i] * (2.0 * v[i, k] / 3.0 + h[i] * a[i, k] / 6.0)
+            nearest_point(keeps.legs, r, control, x[i], point, tangent)
+            for k in range(axes):
+                apart += (control[k] - point[k]) ** 2
+            used[3 * axes + 2] = max(used[3 * axes + 2], np.sqrt(apart) / room[r])
+        if i > 0 and r > leg[i - 1]:
+            used[3 * axes + 2] = max(used[3 * axes + 2], np.sqrt(off) / keeps.vertex_budget[r])
+    return found
 
 
 # So often at most. A share above 1 by more than this comes of places that the motion slid to [-].

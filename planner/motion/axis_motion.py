@@ -16,14 +16,14 @@ itself on straight pieces. It has a kink where the motion turns back, hence step
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.arrays import Array, FloatArray, freeze, read_only
 from planner.base.kernels import njit
 from planner.base.search import last_not_after, nearest
 from planner.geometry.toolpath import Toolpath
@@ -36,6 +36,44 @@ SMALLEST_STEP = 2.0**-30
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 GAUSS_X, GAUSS_W = (1.0 + _NODES) / 2.0, _WEIGHTS / 2.0
 LEVELS = COLUMNS[1:5]  # position, velocity, acceleration, jerk
+OF_PIECES = ("t", *LEVELS, "block", "line")
+
+
+class Pieces(NamedTuple):
+    """The L pieces of n motions (`AxisMotion`) over the same axes, one motion after the other, each in its own time."""
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    block: Array
+    line: Array
+    first: Array  # (n+1,) piece of each motion
+    end: FloatArray  # (n,) [s]
+
+    @classmethod
+    def of(cls, motions: Sequence[AxisMotion | None]) -> Pieces:
+        """Those of several motions; None stands for one without pieces."""
+        given = [one.pieces for one in motions if one is not None]
+        columns = {
+            name: read_only(np.concatenate([getattr(one, name) for one in given])) for name in OF_PIECES
+        }
+        first = np.append(0, np.cumsum([0 if one is None else len(one) for one in motions]))
+        return cls(**columns, first=first, end=np.array([0.0 if one is None else one.end for one in motions]))
+
+    def at(self, of: Array, times: FloatArray) -> dict[str, Any]:
+        """The columns of a trajectory, but for the times and the arc length, of the motions `of` (T,) at their times (T,)
+        within [0, end]; both ascend."""
+        motion, feed, piece = _sample(self, of, times)
+        found: dict[str, Any] = dict(zip(LEVELS, motion, strict=True))
+        return found | {"feed": feed, "block": self.block[piece], "line": self.line[piece]}
+
+    def length(self, s: FloatArray, of: Array, times: FloatArray) -> FloatArray:
+        """(T,) arc length in each motion, as `at` [mm]; s (L + n,): `AxisMotion.s` of one after the other."""
+        found = np.empty(len(times))
+        _put_lengths(self, s, of, times, found)
+        return found
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -85,20 +123,18 @@ class AxisMotion:
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's period."""
-        columns: dict[str, Any] = self.columns(times) | {"s": partial(self.length, times)}
+        of = np.zeros(len(times), dtype=np.int64)
+        columns = self.pieces.at(of, times) | {"s": partial(self._length, of, times)}
         return Trajectory(axes=self.axes, radius=self.radius, dt=dt, t=times, **columns)
 
-    def columns(self, times: FloatArray) -> dict[str, Array]:
-        """Those of a trajectory at ascending times (T,) within [0, end], but for the times and the arc length."""
-        state = (self.position, self.velocity, self.acceleration, self.jerk)
-        motion, feed, piece = _sample((self.t, *state, float(self.end)), times)
-        found: dict[str, Array] = dict(zip(LEVELS, motion, strict=True))
-        return found | {"feed": feed, "block": self.block[piece], "line": self.line[piece]}
+    def _length(self, of: Array, times: FloatArray) -> FloatArray:
+        return self.pieces.length(self.s, of, times)
 
-    def length(self, times: FloatArray) -> FloatArray:
-        """(T,) arc length at ascending times (T,) within [0, end] [mm]."""
-        rates = (self.velocity, self.acceleration, self.jerk)
-        return _lengths((self.t, *rates, self.s, float(self.end)), times)
+    @cached_property
+    def pieces(self) -> Pieces:
+        """Those of this motion alone."""
+        columns = {name: getattr(self, name) for name in OF_PIECES}
+        return Pieces(**columns, first=np.array([0, len(self)]), end=np.array([float(self.end)]))
 
     def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
         """The motion standing longer by `by` (n,) [s] at the piece ends nearest to `at` (n,), its rests."""
@@ -172,15 +208,19 @@ def _arc_lengths(t, velocity, acceleration, jerk, s):
 
 
 @njit(cache=True, error_model="numpy")
-def _sample(pieces, times):
-    """Position and derivatives (4, T, A) at ascending times (T,), and feed and piece there (T,)."""
-    t, position, velocity, acceleration, jerk, end = pieces
+def _sample(pieces, of, times):
+    """Position and derivatives (4, T, A) of the motions `of` (T,) at their times (T,), and feed and piece there (T,)."""
+    t, position, jerk = pieces.t, pieces.position, pieces.jerk
+    velocity, acceleration = pieces.velocity, pieces.acceleration
     samples, axes = len(times), position.shape[1]
     columns = np.empty((4, samples, axes))
     feed, piece = np.empty(samples), np.empty(samples, np.int64)
-    last = len(t) - 1
-    m = last_not_after(t, times[0], 0, last)
+    run, m, last, end = -1, 0, 0, 0.0
     for n in range(len(times)):
+        if of[n] != run:
+            run = of[n]
+            last, end = pieces.first[run + 1] - 1, pieces.end[run]
+            m = last_not_after(t, times[n], pieces.first[run], last)
         while m < last and t[m + 1] <= times[n]:
             m += 1
         over = times[n] >= end
@@ -197,15 +237,16 @@ def _sample(pieces, times):
 
 
 @njit(cache=True, error_model="numpy")
-def _lengths(pieces, times):
-    """Arc length (T,) [mm] at ascending times (T,)."""
-    t, velocity, acceleration, jerk, s, end = pieces
-    found = np.empty(len(times))
-    last = len(t) - 1
-    m = last_not_after(t, times[0], 0, last)
+def _put_lengths(pieces, s, of, times, found):
+    """Arc length (T,) of the motions `of` (T,) at their times (T,), into `found`."""
+    run, m, last, end = -1, 0, 0, 0.0
     for n in range(len(times)):
-        while m < last and t[m + 1] <= times[n]:
+        if of[n] != run:
+            run = of[n]
+            last, end = pieces.first[run + 1] - 1, pieces.end[run]
+            m = last_not_after(pieces.t, times[n], pieces.first[run], last)
+        while m < last and pieces.t[m + 1] <= times[n]:
             m += 1
-        length = _arc_length(velocity[m], acceleration[m], jerk[m], min(times[n], end) - t[m])
-        found[n] = min(s[m] + length, s[m + 1])
-    return found
+        tau = min(times[n], end) - pieces.t[m]
+        here = s[m + run] + _arc_length(pieces.velocity[m], pieces.acceleration[m], pieces.jerk[m], tau)
+        found[n] = min(here, s[m + run + 1])

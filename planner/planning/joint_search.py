@@ -27,7 +27,8 @@ from planner.joint.outcome import TubeSolution
 from planner.joint.own import TubeOwn
 from planner.joint.parts import FoundRun, SplicedRun, parts_of
 from planner.joint.refine import divided, searched_again
-from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.run import TubeRun
+from planner.joint.runs import tube_runs_of
 from planner.joint.solvers import TubeSolver, search_with
 from planner.motion.slowed import times_of_pieces
 from planner.motion.timing import Motion

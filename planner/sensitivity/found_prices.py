@@ -11,6 +11,7 @@ Where the programmed feed and an axis velocity hold together, more of one alone 
 motion has, that part is what counts. Where the start's motion stays nothing is priced.
 """
 
+from functools import cached_property
 from math import fsum  # `sum` rounds otherwise from Python 3.12 on
 
 import numpy as np
@@ -64,14 +65,19 @@ class RunPrices:
         """(N,) prices of the feed where more of it alone is worth something."""
         return np.asarray(self.alone[:, 3 * len(self.found.run.axis) + price.FEED])
 
-    def of_axis(self, quantity: int, axis: int) -> float:
-        """dT/d(ln limit) of a quantity of an axis, where more of it alone is worth something [s]."""
-        axes = self.found.run.axis
-        return float(self.alone[:, quantity * len(axes) + np.flatnonzero(axes == axis)].sum())
+    def of_axes(self, many: int) -> FloatArray:
+        """(3, many) dT/d(ln limit) of the quantities of all axes, where more of them alone is worth something [s]."""
+        found, axes = np.zeros((len(QUANTITIES), many)), self.found.run.axis
+        columns = np.ascontiguousarray(self.alone[:, : len(QUANTITIES) * len(axes)].T)
+        found[:, axes] = columns.sum(axis=1).reshape(len(QUANTITIES), -1)
+        return found
 
     def of_laws(self) -> dict[str, tuple[float, float]]:
         """Of laws that bound the motion somewhere, by name: the least bound, and dT/d(ln limit) [s]."""
-        steps, laws, found = self.found.steps, self.found.run.laws, {}
+        steps, laws = self.found.steps, self.found.run.laws
+        found: dict[str, tuple[float, float]] = {}
+        if not laws.named:
+            return found
         assert steps is not None
         state = np.stack([steps.position, steps.velocity, steps.acceleration], axis=1)
         motion = motion_at(state, steps.jerk, steps.h / 2.0)
@@ -82,6 +88,7 @@ class RunPrices:
                 found[laws.laws[m].name] = float(least[:, column].min()), slope
         return found
 
+    @cached_property
     def feed_saves(self) -> FloatArray:
         """(N,) time saved by `MORE_LIMIT` more of the feed, as far as the axes can follow the motion with it [s]."""
         steps = self.found.steps
@@ -115,7 +122,7 @@ def found_prices(
         float(of_tolerance.together.sum()),
         toolpath,
         cycle_time,
-        bounds={FEED.name: fsum(float(run.feed_saves().sum()) for run in runs)},
+        bounds={FEED.name: fsum(float(run.feed_saves.sum()) for run in runs)},
         unrest=UNREST,
         corners=dearest(toolpath, of_tolerance.alone),
         places=_by_place(toolpath, runs, of_tolerance.together),
@@ -127,11 +134,12 @@ def _of_limits(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """The limits by name, in mm or rad and s, and dT/d(ln limit) of these and of the feed [s]."""
     limit, slope = {}, {FEED.name: fsum(float(run.of_feed().sum()) for run in runs)}
+    of_axes = np.array([run.of_axes(len(toolpath.axes)) for run in runs])
     for quantity, kind in enumerate(QUANTITIES):
         values = machine.limits(kind.name, toolpath.axes)  # type: ignore[arg-type]
         for k, axis in enumerate(toolpath.axes):
             name = kind.called(axis)
-            limit[name], slope[name] = float(values[k]), fsum(run.of_axis(quantity, k) for run in runs)
+            limit[name], slope[name] = float(values[k]), fsum(of_axes[:, quantity, k].tolist())
     for run in runs:
         for name, (least, cost) in run.of_laws().items():
             limit[name] = min(least, limit.get(name, np.inf))
@@ -173,6 +181,6 @@ def _by_place(toolpath: Toolpath, runs: list[RunPrices], by_joint: FloatArray) -
         jerk, acceleration, velocity = (run.step[:, q * axes : (q + 1) * axes].sum(axis=1) for q in range(3))
         every = velocity + run.of(price.FEED) + acceleration + run.of(price.NORMAL) + jerk
         every = every + sum(run.of(price.LAWS + m) for m in run.found.run.laws.named)
-        np.add.at(feed, run.segment, run.feed_saves())
+        np.add.at(feed, run.segment, run.feed_saves)
         np.add.at(limits, run.segment, -share * every)
     return PlacePrices(feed=feed, limits=limits, tolerance=by_joint)

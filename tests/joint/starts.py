@@ -10,7 +10,8 @@ from benchmarks.jobs import problems
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.joint.guess import DEFAULT_CUT, Cut, Guess, guesses_from
-from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.run import TubeRun
+from planner.joint.runs import tube_runs_of
 from planner.machine import Axis, Machine
 from planner.machine.user_limit import JointLimit, PathLimit
 from planner.motion.vertex_times import passing_times

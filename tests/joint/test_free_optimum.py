@@ -16,7 +16,7 @@ from planner.joint import stages
 from planner.joint.guess import guesses_from
 from planner.joint.nlp import TubeNLP
 from planner.joint.own import TubeOwn
-from planner.joint.run import tube_runs_of
+from planner.joint.runs import tube_runs_of
 from planner.motion.trajectory import joined
 from planner.nc.reader import parse_program
 from planner.planning.job.trace import Trace

@@ -195,7 +195,7 @@ def test_shares_are_those_of_a_fine_sampling():
     begin = np.array([[0.0, 0.0], [20.0, 15.0], [0.0, 0.0]])
     state = integrated(begin, h, jerk)
     leg = read_only(np.zeros(steps, np.int64))
-    limit, tube = worst_shares(own.keeps_of(run), leg, h, state, jerk, np.zeros((steps, 3)))
+    limit, tube = worst_shares(run.keeps, leg, h, state, jerk, np.zeros((steps, 3)))
     t = np.linspace(0.0, 1.0, 2001)[:, None, None] * h[None, :, None]
     p, v, a = (state[:-1, k] for k in range(3))
     speeds, pushes = v + t * (a + t * jerk / 2), a + t * jerk
@@ -215,7 +215,7 @@ def test_places_on_a_line_go_never_back_and_the_farthest_is_moved_by_as_little_a
     turning = np.array([[0.3 * run.length[0], 0.0], [-30.0, 5.0], [4000.0, 0.0]])
     state = integrated(turning, h, jerk)
     leg, place, stays = np.zeros(steps, np.int64), np.zeros((steps, 3)), np.zeros((steps, 3), np.bool_)
-    legs = own.keeps_of(run).legs
+    legs = run.keeps.legs
     last = put_places(legs, leg, True, state.reshape(steps + 1, -1), h, place, stays)
     third = h[:, None] / 3.0
     p, v = state[:, 0], state[:, 1]

@@ -8,7 +8,7 @@ import planner
 from benchmarks.campaign import laws
 from benchmarks.jobs import random_lines
 from planner.base.arrays import read_only
-from planner.joint import numbers, own
+from planner.joint import numbers
 from planner.joint.checks import chord_means
 from planner.joint.motion import integrated
 from planner.joint.problem import SEEN
@@ -85,7 +85,7 @@ def test_means_of_chords_are_those_of_the_motion(seed):
     state = integrated(np.array([[39.9, 0.0], [50.0, 5.0], [0.0, 0.0]]), h, jerk)
     leg = np.repeat([0, 1], steps // 2)
     half = 4e-3
-    keeps = own.keeps_of(run)._replace(chord=half)
+    keeps = run.keeps._replace(chord=half)
     means, wider = chord_means(keeps, read_only(leg), h, state, jerk)
     node = np.append(0.0, np.cumsum(h))
 

@@ -14,7 +14,8 @@ from planner.geometry.build import toolpath_from_program
 from planner.joint import price
 from planner.joint.guess import Guess, guesses_from
 from planner.joint.own import TubeOwn
-from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.run import TubeRun
+from planner.joint.runs import tube_runs_of
 from planner.joint.shares import shares
 from planner.motion.vertex_times import passing_times
 from planner.nc.reader import parse_program

@@ -18,8 +18,8 @@ from planner.joint.guess import Guess
 from planner.joint.legs import formula_point, nearest_point
 from planner.joint.motion import closed, integrated
 from planner.joint.nlp import TubeNLP
-from planner.joint.own import keeps_of
-from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.run import TubeRun
+from planner.joint.runs import tube_runs_of
 from planner.nc.reader import parse_program
 
 MACHINE = problems.machine()
@@ -59,7 +59,7 @@ def test_a_run_is_the_programmed_path(program):
 def test_kernels_see_the_legs_of_the_run(program):
     """Points and tangents as the run has them, their bends from differences, and the nearest place of a point beside the leg."""
     run = only_run(program)
-    legs, axes = keeps_of(run).legs, len(run.axis)
+    legs, axes = run.keeps.legs, len(run.axis)
     for r in range(len(run)):
         x, step = 0.4 * run.length[r], 1e-5 * run.length[r]
         point, tangent, bend = (np.empty(axes) for _ in range(3))

@@ -9,7 +9,7 @@ from starts import MACHINE, begun_on
 
 from planner.geometry.build import toolpath_from_program
 from planner.joint.own import TubeOwn
-from planner.joint.run import tube_runs_of
+from planner.joint.runs import tube_runs_of
 from planner.joint.switches import places_in_order, switches_missed
 from planner.nc.reader import parse_program
 

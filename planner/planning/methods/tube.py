@@ -15,7 +15,8 @@ from planner.base.errors import InputError
 from planner.base.names import QUICK
 from planner.joint.groups import searched
 from planner.joint.parts import FoundRun, Spliced, parts_of
-from planner.joint.run import TubeRun, tube_runs_of
+from planner.joint.run import TubeRun
+from planner.joint.runs import tube_runs_of
 from planner.joint.solvers import TubeSolver, tube_solver
 from planner.nc.program import Program
 from planner.planning.job.job import Job

@@ -72,8 +72,7 @@ def reach_bend(pieces, i, q, radius):
     """Which part of piece i of `ProgramPieces`, of an arc or a curve, is within `radius` of q (A,), as
     `reach_piece`."""
     x0, x1 = pieces.piece[i]["x0"], pieces.piece[i]["x1"]
-    x = nearest_on_bend(pieces, i, q)
-    distance_sq, g, slope = _apart(pieces, i, q, x)
+    x, distance_sq, g, slope = nearest_on_bend(pieces, i, q)
     distance = math.sqrt(distance_sq)
     if distance > radius:
         return 1.0, 0.0, distance
@@ -88,20 +87,20 @@ def reach_bend(pieces, i, q, radius):
 
 @kernel()
 def nearest_on_bend(pieces, i, q):
-    """The parameter at which piece i, of an arc or a curve, is nearest to q (A,)."""
+    """The parameter at which piece i, of an arc or a curve, is nearest to q (A,), and what `_apart` gives there."""
     x0, x1 = pieces.piece[i]["x0"], pieces.piece[i]["x1"]
     x = _at_polar_angle(pieces, i, q) if pieces.piece[i]["arc"] >= 0 else _nearest_start(pieces, i, q)
+    distance_sq, g, slope = _apart(pieces, i, q, x)
     for _ in range(NEWTON_STEPS):
-        _, g, slope = _apart(pieces, i, q, x)
         # q is beyond the centre of curvature: one of the ends is nearest, which x already is
         if slope <= 0.0:
             break
         better = min(max(x - g / slope, x0), x1)
-        moved = abs(better - x)
-        x = better
-        if moved <= SETTLED * (x1 - x0):
+        if abs(better - x) <= SETTLED * (x1 - x0):
             break
-    return float(x)
+        x = better
+        distance_sq, g, slope = _apart(pieces, i, q, x)
+    return x, distance_sq, g, slope
 
 
 @kernel()
@@ -133,10 +132,10 @@ def _nearest_start(pieces, i, q):
 @kernel()
 def _apart(pieces, i, q, x):
     """|p(x) - q|^2, g = (p - q).p' and g' of the arc or curve of piece i."""
-    arc = pieces.piece[i]["arc"] >= 0
+    arc, (c, s) = pieces.piece[i]["arc"] >= 0, _direction(pieces, i, x)
     distance_sq, g, slope = 0.0, 0.0, 0.0
     for n in range(len(q)):
-        at, rate, change = _on_arc(pieces, i, x, n) if arc else _on_curve(pieces, i, x, n)
+        at, rate, change = _on_arc(pieces, i, x, c, s, n) if arc else _on_curve(pieces, i, x, n)
         off = at - q[n]
         distance_sq += off * off
         g += off * rate
@@ -145,11 +144,19 @@ def _apart(pieces, i, q, x):
 
 
 @kernel()
-def _on_arc(pieces, i, x, n):
+def _direction(pieces, i, x):
+    """Cosine and sine on the arc of piece i at x; of a curve none."""
+    if pieces.piece[i]["arc"] < 0:
+        return 0.0, 0.0
+    angle = pieces.turn[pieces.piece[i]["arc"], RATE] * x
+    return math.cos(angle), math.sin(angle)
+
+
+@kernel()
+def _on_arc(pieces, i, x, c, s, n):
     """Coordinate n of the arc of piece i at x, and its first two derivatives."""
     k, frame = pieces.piece[i]["arc"], pieces.frame
     radius, rate = pieces.turn[k, RADIUS], pieces.turn[k, RATE]
-    c, s = math.cos(rate * x), math.sin(rate * x)
     circle = radius * (c * frame[k, E1, n] + s * frame[k, E2, n])
     turned = radius * rate * (c * frame[k, E2, n] - s * frame[k, E1, n])
     at = frame[k, CENTER, n] + circle + frame[k, DRIFT, n] * x
@@ -177,9 +184,9 @@ def _on_curve(pieces, i, u, n):
 @kernel()
 def apart_on_bend(pieces, i, q, counts):
     """Squared distance of q (A,) from its nearest point on piece i, an arc or a curve, in axes that `counts` (A,)."""
-    x, apart_sq = nearest_on_bend(pieces, i, q), 0.0
-    arc = pieces.piece[i]["arc"] >= 0
+    (x, _, _, _), apart_sq = nearest_on_bend(pieces, i, q), 0.0
+    arc, (c, s) = pieces.piece[i]["arc"] >= 0, _direction(pieces, i, x)
     for n in range(len(q)):
-        at, _, _ = _on_arc(pieces, i, x, n) if arc else _on_curve(pieces, i, x, n)
+        at, _, _ = _on_arc(pieces, i, x, c, s, n) if arc else _on_curve(pieces, i, x, n)
         apart_sq += counts[n] * (at - q[n]) ** 2
     return apart_sq

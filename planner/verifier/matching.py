@@ -329,6 +329,8 @@ def _longest_rest(pieces, i, before, point, period, at_stop):
         a, j, there = at_stop.acceleration_max[axis], at_stop.jerk_max[axis], pieces.vertex[i, axis]
         was = max(abs(before[axis] - there) - rounding, 0.0)
         will = max(abs(point[axis] - there) - rounding, 0.0)
+        if max(was, will) > min(j * period**3 / 6.0, a * period * period / 2.0):
+            return 0.0  # most are that far away, and roots take longer than all else
         early = max(early, (6.0 * was / j) ** (1.0 / 3.0), math.sqrt(2.0 * was / a))
         late = max(late, (6.0 * will / j) ** (1.0 / 3.0), math.sqrt(2.0 * will / a))
     return max(period - early - late, 0.0)

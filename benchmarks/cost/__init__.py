@@ -13,5 +13,7 @@ What was tried to make them cheaper and brought nothing, so that it is not tried
                    own: numpy's division and argmax are as fast (but not as one pass for all of them: planner/verifier/limits.py);
                    motions of long runs evaluated together: what they take is arithmetic, not calls (of short runs it is
                    calls: planner/joint/parts.py)
-    kernels        in numba's own cache, in three ways: results/first-run.md
+    splines        kernels that may multiply and add in one instruction: as long as before
+    kernels        in numba's own cache, in three ways: results/first-run.md; Python's collector switched off while they are
+                   compiled: 5 % (four fifths of that time are numba's own passes in Python, not the compiler's)
 """

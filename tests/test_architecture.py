@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import planner
+from tests.syntax import statements
 
 PACKAGE = Path(__file__).resolve().parent.parent / "planner"
 
@@ -71,7 +72,7 @@ MODULES = modules()
 def import_statements(module: str) -> tuple[ast.Import | ast.ImportFrom, ...]:
     """Those of a module, also inside functions and for annotations."""
     tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
-    return tuple(node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom))
+    return tuple(node for node in statements(tree) if isinstance(node, ast.Import | ast.ImportFrom))
 
 
 @cache

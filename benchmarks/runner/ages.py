@@ -7,6 +7,7 @@ older ones; those above `STALE` are listed in results/ages.md, which `python -m 
 
 from __future__ import annotations
 
+import functools
 import re
 import subprocess
 from dataclasses import dataclass
@@ -83,6 +84,7 @@ def has_history() -> bool:
         return False
 
 
+@functools.cache  # several results are of one commit
 def commits_since(commit: str) -> int | None:
     """Commits since then that changed the planner; None where the commit is not one of this history."""
     try:

@@ -7,11 +7,12 @@ import pytest
 from kernel_pieces import Alone, look, rows_out
 from starts import begun
 
+from planner.base.arrays import read_only
 from planner.base.kernels import CONTRACT, njit
 from planner.joint import own
 from planner.joint import row_kinds as rows
 from planner.joint.bends import cos_sin
-from planner.joint.legs import formula_point, nearest_point
+from planner.joint.legs import LegFormulas, formula_point, nearest_point
 from planner.joint.problem import window_of
 
 
@@ -49,7 +50,9 @@ def test_nodes_belong_to_nearest_places_and_control_points_to_the_tangents_there
     run, guess = begun(name)
     window = window_of(run, guess, 0, len(guess), own.MISSED)
     window.x[1:-1] += 3e-3 * np.random.default_rng(6).normal(size=window.x[1:-1].shape)
-    alone, legs, limits = Alone.of(window), window.legs, window.limits
+    alone, limits = Alone.of(window), window.limits
+    # as those of a run are, or the kernels of legs would be compiled once more
+    legs = LegFormulas(*map(read_only, window.legs))
     for _ in range(4):  # places come nearer every time
         look(alone)
     g, axes = rows_out(window, alone.work.g)[:, 8 * (window.u.shape[1] - 1) :], window.u.shape[1] - 1

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import planner
 from planner.base.errors import InputError
 from planner.geometry.build import toolpath_from_program
+from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine, load_machine
 from planner.nc.feed_caps import read_feed_caps
 from planner.nc.program import FEED_MOVES, Program
@@ -39,13 +40,8 @@ def capped(folder: Path, text: str, caps: str, machine: Machine | None = None) -
     return planner.read_program(folder / "job.ngc", machine, reading)
 
 
-def lengths(program: Program) -> np.ndarray:
-    return toolpath_from_program(program, load_machine("mill")).length
-
-
-def places(program: Program, share: float) -> np.ndarray:
-    """A place of the path, at a share of its length, by the segments' own formulas."""
-    path = toolpath_from_program(program, load_machine("mill"))
+def place(path: Toolpath, share: float) -> np.ndarray:
+    """A place of a path, at a share of its length, by the segments' own formulas."""
     along = np.append(0.0, np.cumsum(path.length))
     s = share * along[-1]
     k = min(int(np.searchsorted(along, s, side="right")) - 1, len(path) - 1)
@@ -90,16 +86,16 @@ def test_a_cap_on_a_length_holds_there_and_nowhere_else(
     table = "".join(f"{a!r},{a + more!r},{cap!r}\n" for a, more, cap in rows)
     whole = capped(folder, JOB, "line,feed\n4,99999\n")
     parts = capped(folder, JOB, "from_mm,to_mm,feed\n" + table)
+    mill = load_machine("mill")
+    plain, path = (toolpath_from_program(program, mill) for program in (whole, parts))
     for share in np.linspace(0.0, 1.0, 97):
-        assert np.abs(places(whole, share) - places(parts, share)).max() < 1e-6
-    assert lengths(parts).sum() == pytest.approx(lengths(whole).sum(), abs=1e-9)
-    path = toolpath_from_program(parts, load_machine("mill"))
-    edges, asked = np.append(0.0, np.cumsum(path.length)), np.append(0.0, np.cumsum(lengths(whole)))
-    of_whole = toolpath_from_program(whole, load_machine("mill")).feed
+        assert np.abs(place(plain, share) - place(path, share)).max() < 1e-6
+    assert path.length.sum() == pytest.approx(plain.length.sum(), abs=1e-9)
+    edges, asked = (np.append(0.0, np.cumsum(one.length)) for one in (path, plain))
     for s in np.linspace(0.05, edges[-1] - 0.05, 301):
         if min(abs(s - edge) for edge in (*edges, *asked)) < 0.002:
             continue
-        programmed = of_whole[int(np.searchsorted(asked, s)) - 1]
+        programmed = plain.feed[int(np.searchsorted(asked, s)) - 1]
         caps = [cap / 60 for a, more, cap in rows if a < s < a + more and np.isfinite(programmed)]
         assert path.feed[int(np.searchsorted(edges, s)) - 1] == pytest.approx(min([programmed, *caps]))
     assert (parts.uncapped[np.isin(parts.kind, FEED_MOVES)] > 0).all()

@@ -30,7 +30,7 @@ def header(shape: tuple[int, ...], kind: str = "<f8") -> bytes:
 
 def zeros(file: Path, **rows: int) -> Path:
     """An archive of arrays of zeros."""
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, count in rows.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as array:
                 array.write(header((count,)))

@@ -30,8 +30,7 @@ WAY = np.array([[0, 0, 0, 0, 0, 0, 0, 0, 0], [5, 3, 1, 10, 5, 2, 3, 4, 5], [9, 9
 
 
 def test_nine_axes_pass_their_points_in_order(nine: Machine) -> None:
-    """Without a search of path and feed, which would compile a kernel for nine axes: tests/laws/test_axes.py searches in five."""
-    plan = planner.plan(planner.path(WAY, 20.0, axes=LETTERS), nine, method="kinematic")
+    plan = planner.plan(planner.path(WAY, 20.0, axes=LETTERS), nine)
     assert plan.verdict.passed
     trajectory = plan.trajectory
     assert trajectory.axes == tuple(LETTERS)

@@ -147,8 +147,10 @@ class _Search:
     def sweeps(self) -> Generator[Sweep, None, bool]:
         """All windows, then all joins, then what is still kept; whether that may be."""
         steps = len(self.guess)
-        parts = min(np.ceil(steps / WINDOW), self.guess.h.sum() / (LASTS * unit_of(self.run)))
-        parts = 1 if steps <= WHOLE else int(max(parts, np.ceil(steps / WHOLE)))
+        parts = 1
+        if steps > WHOLE:
+            wanted = min(np.ceil(steps / WINDOW), self.guess.h.sum() / (LASTS * unit_of(self.run)))
+            parts = int(max(wanted, np.ceil(steps / WHOLE)))
         even = np.linspace(0, steps, parts + 1).astype(int)
         joins = [self._join(int(near)) for near in even[1:-1]]
         self._slow(joins)
@@ -157,7 +159,8 @@ class _Search:
         yield from self._sweep(
             [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
         )
-        yield from self._sweep(*self._around_kept())
+        if self.kept.any():
+            yield from self._sweep(*self._around_kept())
         return self.settings.stays or not self.kept.any()
 
     def _around_kept(self) -> tuple[list[int], list[int]]:

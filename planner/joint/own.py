@@ -259,10 +259,10 @@ class _Search:
             over = self._taken(lo, hi, window, begun, beside, last=number == TOLD - 1)
             if over is None:
                 self.price[lo:hi] = step_prices(run, window, z)
-                taken, begun = True, Window(self.guess, lo, hi, begun.rest)
-                shorter = z[:, 8 * len(run.axis) + H_MIN].sum()
+                taken, shorter = True, z[:, 8 * len(run.axis) + H_MIN].sum()
                 if shorter <= SHORTENED * window.u[:, -1].sum():
                     break
+                begun = Window(self.guess, lo, hi, begun.rest)
                 continue
             if not over.any():
                 continue
@@ -311,7 +311,7 @@ class _Search:
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
             np.maximum.at(of_leg, leg, np.where((run.radius[leg] > 0.0) | (tube > 1.0), tube, 0.0))
             return np.column_stack([of_leg[leg], of_laws])
-        missed = self._switches_missed(lo, hi, h, found, jerk)
+        missed = self._switches_missed(lo, hi, h, found, jerk) if run.switch.any() else None
         if missed is not None:
             beside.add(missed)
             return np.zeros((hi - lo, 1 + len(run.laws)))

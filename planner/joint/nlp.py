@@ -28,7 +28,7 @@ which is what the tolerance asks for: in order, every vertex reached, both sides
 
 Free durations leave the problem with many equal optima (a phase of constant jerk may be cut anywhere) and
 ipopt trickling among them: a weak pull of every h to its guess makes it one, `PULL`, and weak ones of
-every jerk to 0 and of nodes to their legs (numbers.py). It is not convex and has no certificate: what is
+every jerk to 0 and of nodes to their legs (step_limits.py). It is not convex and has no certificate: what is
 found is the best near the guess. All quantities are in units in which the mean step of the guess has length 1
 and duration 1, so that scaling a job scales its plan.
 """

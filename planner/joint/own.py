@@ -79,7 +79,7 @@ class TubeOwn:
     stays    : the guess keeps all limits, and stays where nothing faster is found. Otherwise it need not, and no part
                of it is kept: windows may end slower than it, and the search ends where nothing is found on a part
     progress : called with the share of the steps that are done [-], in any thread
-    smooth   : weight of the jerk against the time at least [-] (numbers.py); above 0 what is found may be
+    smooth   : weight of the jerk against the time at least [-] (step_limits.py); above 0 what is found may be
                slower than the guess
     least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default,
                where it does not fall, ends a little faster in more iterations

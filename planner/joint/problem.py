@@ -65,7 +65,7 @@ def window_of(
 
     missed : by how much rows may be missed at the end [-]
     tight  : (hi - lo, 1 + M) by what the room of control points and the laws are divided [-], >= 1; None for 1
-    smooth : weight of the jerk against the time at least [-] (numbers.py)
+    smooth : weight of the jerk against the time at least [-] (step_limits.py)
     which  : of the laws, those that have rows; None for those that the guess is near to
     beside : nodes beside a vertex where the feed changes, and places that stand for one
     rest   : of `Window`; None for 0

@@ -43,7 +43,7 @@ class OfRun(NamedTuple):
     step_max: FloatArray  # (R,) [mm]
     switch: FloatArray  # (R,)
     passed: Array  # (R,)
-    by_jerk: float  # what chords are off by jerk (numbers.py) [mm]
+    by_jerk: float  # what chords are off by jerk [mm]
     fastest: float  # all axes together [mm/s]
     strongest: float  # [mm/s2]
     slowest: float  # the slowest axis [mm/s]

@@ -48,7 +48,7 @@ from planner.joint.outcome import BROKE_DOWN, NO_CURVES, SOLVED, STUCK, TubeSolu
 from planner.joint.own_laws import Law
 from planner.joint.run import TubeRun
 from planner.joint.stages import FEASIBILITY, Sizes, options, outcome, staged
-from planner.joint.step_limits import CENTRE, jerk_weights
+from planner.joint.step_limits import CENTRE, jerk_weights, weights
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: without it windows take more iterations, or do not
 # converge; a larger one costs time.
@@ -145,7 +145,7 @@ class TubeNLP:
         h_all = step[axes, :]
         merit = ca.sum2(h_all) + PULL * ca.sumsqr(h_all / ca.DM(h_guess).T - 1)
         used = step[:axes, :] / ca.repmat(ca.DM(j_max), 1, steps)
-        weight = jerk_weights(run.feed[leg], guess.state[:, 1], 0.0)
+        weight = jerk_weights(run.feed[leg], guess.state[:, 1], weights(0.0))
         merit += ca.sum2(ca.sum1(used**2) * ca.DM(weight * h_guess).T)
 
         # ---- dynamics of one step

@@ -14,7 +14,7 @@ from planner.joint.legs import LegFormulas
 from planner.joint.nlp import LONGER
 from planner.joint.row_kinds import StepLimits
 from planner.joint.run import TubeRun
-from planner.joint.step_limits import step_limits
+from planner.joint.step_limits import step_limits, weights
 from planner.joint.switches import Beside, no_rows_beside
 
 # Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks
@@ -151,7 +151,7 @@ def _limits(
         beside,
         np.ascontiguousarray(narrow[1][:, 0]),
         cut.rest if told else np.zeros((0, len(run.axis) + 1)),
-        (inside, smooth, LONGER_TOLD if told else LONGER),
+        (inside, weights(smooth), LONGER_TOLD if told else LONGER),
     )
     at_vertex, on, passed, room, room_node, rest, feed, feed_node, normal, normal_node, turns, step_max = (
         found[0]

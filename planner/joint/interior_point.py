@@ -5,7 +5,7 @@
     subject to  the kinematics (recursion.py) and g <= 0 for every row (rows.py), with slacks s and multipliers z
 
 from a motion that need keep neither: gaps and what is missing of g + s = 0 shrink with every step. The h of
-the last sum is as it was guessed, and d the distance of the node from its leg (numbers.py). Kinematics and
+the last sum is as it was guessed, and d the distance of the node from its leg (step_limits.py). Kinematics and
 rows are linearised anew in every iteration. The curvature of the rows counts, that of the kinematics does
 not: h times velocity, acceleration and jerk is indefinite, and with it a step would not go down. Instead a
 change of h costs `prox` in every iteration, so that steps stay where the linear model holds, and no step goes

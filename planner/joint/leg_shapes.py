@@ -154,9 +154,9 @@ def with_words(toolpath: Toolpath, row: Array, of: tuple[Array, FloatArray]) -> 
 def words_of(
     toolpath: Toolpath, row: Array, of: tuple[Array, FloatArray]
 ) -> tuple[FloatArray, FloatArray, str]:
-    """`word` (R, 1) and `counts` of the legs of a run with such legs, over all axes; and why no motion can be looked for. Inside
-    the tolerance x, y and z may take what the rotary axes need not, so that F is a limit of its own; it has to be of the same
-    axes everywhere, and to change with the feed in all of them."""
+    """`word` (R, 1) and `counts` over all axes, of the legs of a run with such legs that the segments `row` (R,) stand for, from
+    `word_shares`; and why no motion can be looked for. Inside the tolerance x, y and z may take what the rotary axes need not,
+    so that F is a limit of its own; it has to be of the same axes everywhere, and to change with the feed in all of them."""
     groups, by, share = feed_groups(toolpath.axes), of[0][row], of[1][row]
     feed, finite = toolpath.feed[row], np.isfinite(toolpath.feed[row])
     every, word = np.ones(len(groups)), (feed * share)[:, None]

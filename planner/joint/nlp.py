@@ -28,7 +28,7 @@ which is what the tolerance asks for: in order, every vertex reached, both sides
 
 Free durations leave the problem with many equal optima (a phase of constant jerk may be cut anywhere) and
 ipopt trickling among them: a weak pull of every h to its guess makes it one, `PULL`, and weak ones of
-every jerk to 0 and of nodes to their legs (numbers.py). It is not convex and has no certificate: what is
+every jerk to 0 and of nodes to their legs (step_limits.py). It is not convex and has no certificate: what is
 found is the best near the guess. All quantities are in units in which the mean step of the guess has length 1
 and duration 1, so that scaling a job scales its plan.
 """
@@ -48,7 +48,7 @@ from planner.joint.outcome import BROKE_DOWN, NO_CURVES, SOLVED, STUCK, TubeSolu
 from planner.joint.own_laws import Law
 from planner.joint.run import TubeRun
 from planner.joint.stages import FEASIBILITY, Sizes, options, outcome, staged
-from planner.joint.step_limits import CENTRE, jerk_weights
+from planner.joint.step_limits import CENTRE, jerk_weights, weights
 
 # Weight of ((h - guess)/guess)^2 against a step's time [-]: without it windows take more iterations, or do not
 # converge; a larger one costs time.
@@ -145,7 +145,7 @@ class TubeNLP:
         h_all = step[axes, :]
         merit = ca.sum2(h_all) + PULL * ca.sumsqr(h_all / ca.DM(h_guess).T - 1)
         used = step[:axes, :] / ca.repmat(ca.DM(j_max), 1, steps)
-        weight = jerk_weights(run.feed[leg], guess.state[:, 1], 0.0)
+        weight = jerk_weights(run.feed[leg], guess.state[:, 1], weights(0.0))
         merit += ca.sum2(ca.sum1(used**2) * ca.DM(weight * h_guess).T)
 
         # ---- dynamics of one step

@@ -79,7 +79,7 @@ class TubeOwn:
     stays    : the guess keeps all limits, and stays where nothing faster is found. Otherwise it need not, and no part
                of it is kept: windows may end slower than it, and the search ends where nothing is found on a part
     progress : called with the share of the steps that are done [-], in any thread
-    smooth   : weight of the jerk against the time at least [-] (numbers.py); above 0 what is found may be
+    smooth   : weight of the jerk against the time at least [-] (step_limits.py); above 0 what is found may be
                slower than the guess
     least    : to which the price on changes of durations falls at the end [-]; 0.01 instead of the default,
                where it does not fall, ends a little faster in more iterations
@@ -147,8 +147,10 @@ class _Search:
     def sweeps(self) -> Generator[Sweep, None, bool]:
         """All windows, then all joins, then what is still kept; whether that may be."""
         steps = len(self.guess)
-        parts = min(np.ceil(steps / WINDOW), self.guess.h.sum() / (LASTS * unit_of(self.run)))
-        parts = 1 if steps <= WHOLE else int(max(parts, np.ceil(steps / WHOLE)))
+        parts = 1
+        if steps > WHOLE:
+            wanted = min(np.ceil(steps / WINDOW), self.guess.h.sum() / (LASTS * unit_of(self.run)))
+            parts = int(max(wanted, np.ceil(steps / WHOLE)))
         even = np.linspace(0, steps, parts + 1).astype(int)
         joins = [self._join(int(near)) for near in even[1:-1]]
         self._slow(joins)
@@ -157,7 +159,8 @@ class _Search:
         yield from self._sweep(
             [self._join(join - OVERLAP) for join in joins], [self._join(join + OVERLAP) for join in joins]
         )
-        yield from self._sweep(*self._around_kept())
+        if self.kept.any():
+            yield from self._sweep(*self._around_kept())
         return self.settings.stays or not self.kept.any()
 
     def _around_kept(self) -> tuple[list[int], list[int]]:
@@ -256,10 +259,10 @@ class _Search:
             over = self._taken(lo, hi, window, begun, beside, last=number == TOLD - 1)
             if over is None:
                 self.price[lo:hi] = step_prices(run, window, z)
-                taken, begun = True, Window(self.guess, lo, hi, begun.rest)
-                shorter = z[:, 8 * len(run.axis) + H_MIN].sum()
+                taken, shorter = True, z[:, 8 * len(run.axis) + H_MIN].sum()
                 if shorter <= SHORTENED * window.u[:, -1].sum():
                     break
+                begun = Window(self.guess, lo, hi, begun.rest)
                 continue
             if not over.any():
                 continue
@@ -308,7 +311,7 @@ class _Search:
             of_leg = np.where(run.radius > 0.0, 1.0, 0.0)
             np.maximum.at(of_leg, leg, np.where((run.radius[leg] > 0.0) | (tube > 1.0), tube, 0.0))
             return np.column_stack([of_leg[leg], of_laws])
-        missed = self._switches_missed(lo, hi, h, found, jerk)
+        missed = self._switches_missed(lo, hi, h, found, jerk) if run.switch.any() else None
         if missed is not None:
             beside.add(missed)
             return np.zeros((hi - lo, 1 + len(run.laws)))

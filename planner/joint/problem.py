@@ -14,7 +14,7 @@ from planner.joint.legs import LegFormulas
 from planner.joint.nlp import LONGER
 from planner.joint.row_kinds import StepLimits
 from planner.joint.run import TubeRun
-from planner.joint.step_limits import step_limits
+from planner.joint.step_limits import step_limits, weights
 from planner.joint.switches import Beside, no_rows_beside
 
 # Limits are narrowed by so many times what a row may be missed by [-], so that this and the closing jerks
@@ -65,7 +65,7 @@ def window_of(
 
     missed : by how much rows may be missed at the end [-]
     tight  : (hi - lo, 1 + M) by what the room of control points and the laws are divided [-], >= 1; None for 1
-    smooth : weight of the jerk against the time at least [-] (numbers.py)
+    smooth : weight of the jerk against the time at least [-] (step_limits.py)
     which  : of the laws, those that have rows; None for those that the guess is near to
     beside : nodes beside a vertex where the feed changes, and places that stand for one
     rest   : of `Window`; None for 0
@@ -151,7 +151,7 @@ def _limits(
         beside,
         np.ascontiguousarray(narrow[1][:, 0]),
         cut.rest if told else np.zeros((0, len(run.axis) + 1)),
-        (inside, smooth, LONGER_TOLD if told else LONGER),
+        (inside, weights(smooth), LONGER_TOLD if told else LONGER),
     )
     at_vertex, on, passed, room, room_node, rest, feed, feed_node, normal, normal_node, turns, step_max = (
         found[0]

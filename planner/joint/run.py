@@ -142,7 +142,7 @@ class TubeRun(LegShapes):
 
     @cached_property
     def off_by_jerk(self) -> float:
-        """How far chords that pass a place at another share than the middle are off by jerk (numbers.py) [mm]."""
+        """How far chords that pass a place at another share than the middle are off by jerk (step_limits.py) [mm]."""
         # without limits nothing is known of it
         jerk = np.linalg.norm(self.jerk) if np.isfinite(self.jerk).all() else 0.0
         return float(jerk) * self.chord**3 / 6.0

@@ -43,7 +43,7 @@ class OfRun(NamedTuple):
     step_max: FloatArray  # (R,) [mm]
     switch: FloatArray  # (R,)
     passed: Array  # (R,)
-    by_jerk: float  # what chords are off by jerk (numbers.py) [mm]
+    by_jerk: float  # what chords are off by jerk [mm]
     fastest: float  # all axes together [mm/s]
     strongest: float  # [mm/s2]
     slowest: float  # the slowest axis [mm/s]
@@ -61,18 +61,24 @@ def speeds(velocity):
     return found
 
 
+def weights(least: float) -> tuple[float, float, float, float]:
+    """These, and what the weight of the jerk is at least [-], for kernels: a constant would be compiled into them."""
+    return SMOOTH_AT_FEED, SMOOTH, CENTRE, float(least)
+
+
 @njit(cache=True, error_model="numpy")
-def jerk_weights(feed, velocity, least):
+def jerk_weights(feed, velocity, weights):
     """(N,) weights of the jerks of steps [-]. Where the feed holds the motion less jerk costs no time, on
     ramps it does.
 
     feed     : (N,) of the steps' legs [mm/s]
     velocity : (N+1, A) of the nodes [mm/s]
-    least    : weight of any step at least [-]
+    weights  : as the function returns them
     """
+    at_feed, otherwise, _, least = weights
     speed = speeds(velocity)
     held = np.minimum(speed[:-1], speed[1:]) >= AT_FEED * feed
-    return np.maximum(np.where(held, SMOOTH_AT_FEED, SMOOTH), least)
+    return np.maximum(np.where(held, at_feed, otherwise), least)
 
 
 @njit(cache=True, error_model="numpy")
@@ -107,10 +113,10 @@ def step_limits(run, units, origin, cut, before, rest_at, beside, tight, rest, n
     beside  : `Beside` (switches.py)
     tight   : (N,) by what the room is divided [-]
     rest    : (N+1, A+1) of `Window`, 0 rows where nothing is known
-    numbers : what limits are multiplied by [-]; the weight of the jerk at least [-]; by what durations may change [-]
+    numbers : what limits are multiplied by [-]; `weights`; by what durations may change [-]
     """
     leg, h, state = cut
-    inside, least, longer = numbers
+    inside, weights, longer = numbers
     second, length, speed, acceleration = units
     N, axes = len(leg), state.shape[2]
     first = 8 * axes
@@ -119,9 +125,9 @@ def step_limits(run, units, origin, cut, before, rest_at, beside, tight, rest, n
     rests, feed, feed_node = np.zeros((N, 2, axes)), np.empty(N), np.empty(N)
     normal, normal_node, step_max = np.empty(N), np.empty(N), np.empty(N)
     switch, switch_at, side = np.zeros(N), np.empty((N, axes)), np.zeros((N, axes))
-    lasting, centre = np.empty(N), np.full(N, CENTRE)
+    lasting, centre = np.empty(N), np.full(N, weights[2])
     velocity = state[:, 1]
-    own_pace, smooth = pace(velocity), jerk_weights(run.feed[leg], velocity, least)
+    own_pace, smooth = pace(velocity), jerk_weights(run.feed[leg], velocity, weights)
     turns, fed, over = turns_far(velocity), False, False
     for i in range(N):
         fed |= run.feed[leg[i]] < run.fastest

@@ -11,7 +11,7 @@ then it stays where the search does not end.
 import dataclasses
 from collections.abc import Callable, Container, Mapping
 from functools import partial
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -175,6 +175,12 @@ def joint_plan(
     return Joint(plan, steps) if slower is None else Joint(None, steps, slower=plan)
 
 
+def _without(found: list[FoundRun], stays: list[int]) -> list[FoundRun]:
+    """The runs but for those in `stays`."""
+    left = set(stays)
+    return [one for k, one in enumerate(found) if k not in left]
+
+
 def _time(made: Alone) -> float:
     return (made.delivered.slower or made.delivered).trajectory.cycle_time
 
@@ -208,8 +214,8 @@ def solver_of(search: Search, report: Report, *, stays: bool) -> TubeOwn | InTwo
     own = partial(TubeOwn, smooth=search.smooth)
     if stays and not search.finer:
         return own(search.gap, progress=report)
-    ends = np.cumsum([0.0, *SEARCHES[: len(search.finer) + 1]])
-    parts = pairwise((ends / ends[-1]).tolist())
+    ends = list(accumulate((0.0, *SEARCHES[: len(search.finer) + 1])))
+    parts = pairwise(end / ends[-1] for end in ends)
     shares = [lambda done, a=a, b=b: report(a + done * (b - a)) for a, b in parts]
     return InTwo(
         own(search.gap, stays=False, progress=shares[0]),
@@ -304,7 +310,7 @@ def tabled(
     if job.real[0].fir is not None:
         return NO_TABLES, ()
     with job.stage("report"):
-        taken = [one for k, one in enumerate(found) if k not in stays]
+        taken = _without(found, stays)
         prices = found_prices(job.toolpath, job.machine, taken, made.trajectory.cycle_time)
         grid = found_history(job.toolpath, made.motion, found, stays, start, alone)
     moving = made.trajectory.cycle_time - float(job.toolpath.dwell.sum())
@@ -319,7 +325,7 @@ def said(
     job: Job, first: Start, found: list[FoundRun], stays: list[int], why: str, what: str
 ) -> tuple[Status, str]:
     """Status and sentence: of the worst search, and where the start stays. `what` the start is."""
-    took = [one for k, one in enumerate(found) if k not in stays]
+    took = _without(found, stays)
     worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
     text = worst.sentence if worst else "no motion faster than the start's was found"
     text += f"; before that ({what}) {first.motion.end:.6g} s"

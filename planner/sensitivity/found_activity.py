@@ -73,10 +73,10 @@ def found_history(
     others = tuple(dict.fromkeys(name for each in known for name in each if name not in own))
     names = (*own, *others, NONE, REST)
     rows = _Rows(names)
-    parts = list(zip(motion.runs, motion.begin[:-1].tolist(), strict=True))
+    parts, whole = zip(motion.runs, motion.begin[:-1].tolist(), strict=True), set(kept)
     for k, one in enumerate(found):
-        for lo, hi, stays in [(0, 0, True)] if k in kept else one.ranges():
-            part, begin = parts.pop(0)
+        for lo, hi, stays in [(0, 0, True)] if k in whole else one.ranges():
+            part, begin = next(parts)
             if not stays:
                 _of_steps(rows, toolpath, one, (lo, hi), (part, begin))
             elif (held := alone.get(k, start)) is None:

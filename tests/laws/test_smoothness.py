@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planner
-from planner.joint import numbers, problem
+from planner.joint import step_limits
 
 # 80 chords of a sine at a feed that the axes keep all along.
 FEED = 30.0  # [mm/s]
@@ -36,8 +36,8 @@ def rms_jerk(plan: planner.Plan, least: float = 0.0) -> float:
 def test_at_the_feed_jerk_is_small_for_no_time(monkeypatch: pytest.MonkeyPatch):
     """Against a search that does not mind it: a quarter less jerk, at less than 1e-4 of the time."""
     smooth = planned(WAVE)
-    monkeypatch.setattr(numbers, "SMOOTH_AT_FEED", 0.0)
-    monkeypatch.setattr(numbers, "SMOOTH", 0.0)
+    monkeypatch.setattr(step_limits, "SMOOTH_AT_FEED", 0.0)
+    monkeypatch.setattr(step_limits, "SMOOTH", 0.0)
     rough = planned(WAVE)
     assert rms_jerk(smooth, AT) <= 0.75 * rms_jerk(rough, AT)
     assert smooth.cycle_time <= rough.cycle_time * (1.0 + 1e-4)
@@ -52,7 +52,7 @@ def test_a_rapid_straight_up_stays_on_its_line(monkeypatch: pytest.MonkeyPatch):
         return float(np.ptp(seen.position[(z > 0.05) & (z < 4.5), 0]))
 
     near = planned(RETRACT)
-    monkeypatch.setattr(problem, "CENTRE", 0.0)
+    monkeypatch.setattr(step_limits, "CENTRE", 0.0)
     free = planned(RETRACT)
     assert aside(near) < 0.3 * aside(free)
     assert near.cycle_time <= free.cycle_time * (1.0 + 1e-4)

@@ -34,6 +34,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.kernels import njit
 from planner.controls.timing.models import along, move_times, reachable, stoppable
 from planner.machine import Machine
 
@@ -50,7 +51,8 @@ FLAT = 1e12  # radius of what counts as a line [mm]
 BLOCKS = 50  # ARC_BLEND_OPTIMIZATION_DEPTH, its default
 
 
-def joined_moves(points: FloatArray, feed: FloatArray, rapid: Array, stop: Array, within: float) -> Array:
+@njit(cache=True, error_model="numpy")
+def joined_moves(points, feed, rapid, stop, within):
     """Indices of the vertices that LinuxCNC keeps with G64 Q.
 
     points : (n+1, A) [mm]
@@ -59,20 +61,22 @@ def joined_moves(points: FloatArray, feed: FloatArray, rapid: Array, stop: Array
     stop   : (n+1,) where the motion stands
     within : Q [mm]; 0 joins nothing
     """
-    kept, first = [0], 0
+    kept, count, first = np.zeros(len(points), np.int64), 1, 0
     for k in range(1, len(points) - 1):
-        chain = points[first + 1 : k + 1]
         chord = points[k + 1] - points[first]
-        size = float(chord @ chord)
+        size = (chord * chord).sum()
         same = feed[k] == feed[first] and not rapid[k] and not rapid[first] and not stop[k]
-        if within > 0.0 and same and size > 0.0 and k - first <= CHAIN:
-            u = np.clip((chain - points[first]) @ chord / size, 0.0, 1.0)
-            off = np.linalg.norm(chain - points[first] - u[:, None] * chord, axis=1)
-            if (off <= within).all():
-                continue
-        kept.append(k)
-        first = k
-    return np.array([*kept, len(points) - 1])
+        joined = within > 0.0 and same and size > 0.0 and k - first <= CHAIN
+        for n in range(first + 1, k + 1):
+            if not joined:
+                break
+            way = points[n] - points[first]
+            u = min(max((way * chord).sum() / size, 0.0), 1.0)
+            joined = np.sqrt(((way - u * chord) ** 2).sum()) <= within
+        if not joined:
+            kept[count], count, first = k, count + 1, k
+    kept[count] = len(points) - 1
+    return kept[: count + 1]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

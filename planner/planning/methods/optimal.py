@@ -33,7 +33,7 @@ class OptimalMethod(Method):
              together (planning/optimal/effort.py); that is with corner "auto", the own solver and no shaping
     smooth : weight of the squares of all jerks, as shares of their limits, against the time [-], 0 or more:
              with more the joint search finds a smoother and slower motion; at 0 jerk is small only where it
-             costs no time (joint/numbers.py)
+             costs no time (joint/step_limits.py)
     shaped : deliver setpoints that leave the machine's vibration modes at rest (planning/optimal/shaped.py)
     """
 

@@ -7,7 +7,7 @@ it.
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import os
 import re
 import resource
@@ -96,11 +96,15 @@ def outcome(
     """What became of a mutant: `KILLED`, `SURVIVED` or `NO_END`; by which test; and processor seconds."""
     file = folder / mutant.file
     right = file.read_text(encoding="utf-8")
+    # Python knows bytecode by the second and the size of its source, and the mutant before may have had both
+    bytecode = Path(importlib.util.cache_from_source(str(file)))
     file.write_text(mutant.of(right), encoding="utf-8")
+    bytecode.unlink(missing_ok=True)
     try:
         return run(folder, tests, without, usual)
     finally:
         file.write_text(right, encoding="utf-8")
+        bytecode.unlink(missing_ok=True)
 
 
 def run(

@@ -125,7 +125,7 @@ def group_of(
     for lane, one in enumerate(windows):
         legs, limits = one.legs, one.limits
         of_legs = legs.length, legs.base, legs.drift, legs.e1, legs.radius
-        of_steps = tuple(getattr(limits, name) for name in _OF_STEPS)
+        of_steps = tuple(getattr(limits, name) for name in _OF_STEPS.split())
         put_window(group, lane, of_legs, _formulas_of(legs, bends), of_steps, limits.box, limits.sag)
         put_motion((x, u, place), lane, (one.x, one.u, one.place))
         group.aside[0, lane] = limits.aside
@@ -144,21 +144,8 @@ def group_of(
 
 
 _OF_STEPS = (
-    *(
-        "leg",
-        "passed",
-        "at_vertex",
-        "on",
-        "turns",
-        "target",
-        "rest",
-        "switch_at",
-        "side",
-        "room",
-        "room_node",
-    ),
-    *("feed", "feed_node", "normal", "normal_node", "step_max", "pace", "h", "h_max", "h_min"),
-    *("switch", "smooth", "centre"),
+    "leg passed at_vertex on turns target rest switch_at side room room_node "
+    "feed feed_node normal normal_node step_max pace h h_max h_min switch smooth centre"
 )
 
 

@@ -141,7 +141,7 @@ def _limits(
         [run.jerk_scale / jerk, run.acceleration / acc, run.velocity / speed, run.velocity / speed]
     )
     inside = 1.0 - NARROWED * narrow[0]
-    found = step_limits(
+    of_room, of_pace, of_time = step_limits(
         run.of_steps,
         (second, length, speed, acc),
         units.origin,
@@ -153,10 +153,9 @@ def _limits(
         cut.rest if told else np.zeros((0, len(run.axis) + 1)),
         (inside, weights(smooth), LONGER_TOLD if told else LONGER),
     )
-    at_vertex, on, passed, room, room_node, rest, feed, feed_node, normal, normal_node, turns, step_max = (
-        found[0]
-    )
-    pace, h, h_max, h_min, switch, switch_at, side, smooth_by, centre = found[1]
+    at_vertex, on, passed, room, room_node, rest, turns, step_max, switch, switch_at, side = of_room
+    feed, feed_node, normal, normal_node, pace = of_pace
+    h, h_max, h_min, smooth_by, centre = of_time
     return StepLimits(
         leg=leg - leg[0],
         passed=passed,

@@ -44,10 +44,7 @@ def _shares(keeps, room, vertex, leg, h, motion, x):
     p, v, a, j = motion
     N, axes = p.shape
     found = np.zeros((N, 3 * axes + 3))
-    control, point, tangent, speed, push = (
-        *(np.empty(axes), np.empty(axes), np.empty(axes)),
-        *(np.empty(axes), np.empty(axes)),
-    )
+    control, point, tangent, speed, push = np.empty((5, axes))
     for i in range(N):
         r, used = leg[i], found[i]
         square, along, across, off = 0.0, 0.0, 0.0, 0.0

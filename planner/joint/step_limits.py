@@ -101,8 +101,8 @@ def pace(velocity):
 @njit(cache=True, error_model="numpy")
 def step_limits(run, units, origin, cut, before, rest_at, beside, tight, rest, numbers):
     """The columns of `StepLimits` (row_kinds.py) that do not depend on laws, places on legs that are passed, or limits of
-    axes: in this order at_vertex, on, passed, room, room_node, rest, feed, feed_node, normal, normal_node, turns, step_max,
-    pace, h, h_max, h_min, switch, switch_at, side, smooth, centre.
+    axes: in this order at_vertex, on, passed, room, room_node, rest, turns, step_max, switch, switch_at, side; feed, feed_node,
+    normal, normal_node, pace; h, h_max, h_min, smooth, centre.
 
     run     : `OfRun`
     units   : of time [s], length [mm], speed and acceleration
@@ -187,31 +187,9 @@ def step_limits(run, units, origin, cut, before, rest_at, beside, tight, rest, n
         normal_node[i] = min(normal[i], normal[i - 1] if i else normal[0]) * inside / acceleration
     for i in range(N):
         feed[i], normal[i] = feed[i] * inside / speed, normal[i] * inside / acceleration
-    found = (
-        at_vertex,
-        on,
-        passed,
-        room,
-        room_node,
-        rests,
-        feed,
-        feed_node,
-        normal,
-        normal_node,
-        turns,
-        step_max,
-    )
-    more_found = (
-        own_pace / speed,
-        lasting,
-        lasting * longer,
-        lasting / longer,
-        switch,
-        switch_at,
-        side,
-        smooth,
-    )
-    return found, (*more_found, centre)
+    of_room = at_vertex, on, passed, room, room_node, rests, turns, step_max, switch, switch_at, side
+    of_pace = feed, feed_node, normal, normal_node, own_pace / speed
+    return of_room, of_pace, (lasting, lasting * longer, lasting / longer, smooth, centre)
 
 
 @njit(cache=True, error_model="numpy")

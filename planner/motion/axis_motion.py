@@ -70,7 +70,8 @@ class Pieces(NamedTuple):
         return found | {"feed": feed, "block": self.block[piece], "line": self.line[piece]}
 
     def length(self, s: FloatArray, of: Array, times: FloatArray) -> FloatArray:
-        """(T,) arc length in each motion, as `at` [mm]; s (L + n,): `AxisMotion.s` of one after the other."""
+        """(T,) arc length [mm] of the motions `of` (T,) at their times (T,) [s]; s (L + n,): `AxisMotion.s` of one after the
+        other."""
         found = np.empty(len(times))
         _put_lengths(self, s, of, times, found)
         return found

@@ -11,7 +11,7 @@ from planner.corners.smooth import SmoothPath
 from planner.geometry.spline import Spline, span_dtype
 from planner.geometry.toolpath import Toolpath
 from planner.machine import Machine
-from planner.smoothing.basis import ORDER, derivatives
+from planner.smoothing.basis import DEGREE, ORDER, derivatives
 from planner.smoothing.corridor import Corridor, find_corridor
 from planner.smoothing.initial import lay
 from planner.smoothing.relax import REACH, Goal, relax
@@ -34,6 +34,7 @@ class SplineShape:
     splines: Splines
     # (S,) what the certificate leaves of the tolerance a shape may use [mm]; negative without one
     left: FloatArray
+    cusp: Array  # (S,) spans with a cusp (`cusp_spans`)
     reserve: float  # the part of the tolerance that it leaves to chord and filter errors [mm]
 
     def laid(self) -> "SplineShape":
@@ -43,9 +44,11 @@ class SplineShape:
         return dataclasses.replace(self, corridor=corridor, splines=self.splines._replace(sites=sites))
 
 
-def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
+def spline_shape(path: SmoothPath, machine: Machine, before: SplineShape | None = None) -> SplineShape:
     """Splines inside the tolerance for all runs of a path with rounded corners: laid (initial.py), relaxed
     with a certificate (relax.py), and without a cusp. A run that gets none has `fits` False.
+
+    before : of the same path with fewer full stops: runs that are the same have the same splines
 
     Raises InputError if the machine lacks an axis of the path.
     """
@@ -60,24 +63,83 @@ def spline_shape(path: SmoothPath, machine: Machine) -> SplineShape:
     longest = longest_span(path, machine, of_leg)
     runs = find_runs(path, machine, longest)
     corridor = find_corridor(path, runs, tol)
-    # the longest span of a run: of its slowest leg
-    of_run = _smallest(longest, runs)
-    splines = lay(corridor, of_run)
     jerk = machine.limits("jerk", axes)
     weights = (jerk.min() / jerk) ** 2
     goal = Goal(RELATIVE_GAP, weights, REACH)
-    relaxed = relax(corridor, splines, runs, goal)
+    # the longest span of a run: of its slowest leg
+    of_run = _smallest(longest, runs)
+    known = np.full(len(of_run), -1) if before is None else _known(runs, corridor, before)
+    new = np.flatnonzero(known < 0)
+    of_new = SplineRuns(*(column[new] for column in runs))
+    around = corridor if before is None else find_corridor(path, of_new, tol)
+    splines = lay(around, of_run[new])
+    relaxed = relax(around, splines, of_new, goal)
     splines = splines._replace(control=relaxed.control)
-    splines = splines._replace(fits=relaxed.certified & ~cusps(splines))
-    reserve = float((tolerance - tol).min())
-    return SplineShape(runs=runs, corridor=corridor, splines=splines, left=relaxed.left, reserve=reserve)
+    cusp = cusp_spans(splines)
+    of_runs = np.logical_or.reduceat(cusp, splines.span_first[:-1]) if len(new) else np.zeros(0, bool)
+    splines = splines._replace(fits=relaxed.certified & ~of_runs)
+    shape = SplineShape(
+        runs=runs,
+        corridor=corridor,
+        splines=splines,
+        left=relaxed.left,
+        cusp=cusp,
+        reserve=float((tolerance - tol).min()),
+    )
+    if before is None:
+        return shape
+    known[new] = len(before.splines.fits) + np.arange(len(new))
+    return _with_known(shape, before, known)
 
 
-def cusps(splines: Splines) -> Array:
-    """(Q,) True for runs with a cusp (`cusp_spans`)."""
-    if not len(splines.fits):
-        return splines.fits
-    return np.asarray(np.logical_or.reduceat(cusp_spans(splines), splines.span_first[:-1]))
+def _known(runs: SplineRuns, corridor: Corridor, before: SplineShape) -> Array:
+    """(Q,) which run of another shape each run is, with the same corridor; -1 where there is none."""
+    if not len(before.splines.fits) or not len(runs.joint_first):
+        return np.full(len(runs.joint_first), -1)
+    there = np.searchsorted(before.runs.joint_first, runs.joint_first)
+    there = np.minimum(there, len(before.splines.fits) - 1)
+    vertices, others = np.diff(corridor.first), np.diff(before.corridor.first)
+    same = vertices == others[there]
+    for mine, other in zip(runs, before.runs, strict=True):
+        same &= mine == other[there]
+    if not same.any():
+        return np.full(len(same), -1)
+    rows, of = _rows(vertices, np.flatnonzero(same)), _rows(others, there[same])
+    equal = np.ones(len(rows), bool)
+    for mine, other in zip(corridor[1:], before.corridor[1:], strict=True):
+        equal &= (mine[rows] == other[of]).reshape(len(rows), -1).all(axis=1)
+    edges = np.append(0, np.cumsum(vertices[same]))[:-1]
+    same[same] = np.logical_and.reduceat(equal, edges)
+    return np.where(same, there, -1)
+
+
+def _rows(counts: Array, chosen: Array) -> Array:
+    """Numbers of the rows of the `chosen` (k,) runs, of which each run has so many (Q,), one after the other."""
+    first, many = np.cumsum(counts) - counts, counts[chosen]
+    return np.repeat(first[chosen] - (np.cumsum(many) - many), many) + np.arange(many.sum())
+
+
+def _with_known(shape: SplineShape, before: SplineShape, chosen: Array) -> SplineShape:
+    """The shape, of new runs alone, with those of the runs of another one: `chosen` (Q,) of these and the new ones behind
+    them."""
+    both = before.splines, shape.splines
+    spans = np.concatenate([np.diff(one.span_first) for one in both])
+    sites = np.concatenate([np.diff(one.site_first) for one in both])
+
+    def of(counts: Array, *columns: Array) -> Array:
+        return np.concatenate(columns)[_rows(counts, chosen)]
+
+    splines = Splines(
+        span_first=np.append(0, np.cumsum(spans[chosen])),
+        breaks=of(spans + 1, *(one.breaks for one in both)),
+        control=of(spans + DEGREE, *(one.control for one in both)),
+        site_first=np.append(0, np.cumsum(sites[chosen])),
+        sites=Sites(*(of(sites, *columns) for columns in zip(*(one.sites for one in both), strict=True))),
+        outside=of(spans, *(one.outside for one in both)),
+        fits=np.concatenate([one.fits for one in both])[chosen],
+    )
+    left, cusp = of(spans, before.left, shape.left), of(spans, before.cusp, shape.cusp)
+    return dataclasses.replace(shape, splines=splines, left=left, cusp=cusp)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -111,7 +173,7 @@ def lost_joints(path: SmoothPath, shape: SplineShape, fence: bool = False) -> Ar
     those on both sides of it (`fence`), which leave a run of a few joints there."""
     splines, runs = shape.splines, shape.runs
     lost = np.repeat(~splines.fits, np.diff(splines.span_first))
-    spans = np.flatnonzero(lost & (splines.outside | (shape.left < 0.0) | cusp_spans(splines)))
+    spans = np.flatnonzero(lost & (splines.outside | (shape.left < 0.0) | shape.cusp))
     run = np.searchsorted(splines.span_first, spans, side="right") - 1
     begin, end = splines.breaks[spans + run], splines.breaks[spans + run + 1]
     place = path.legs.place[path.legs.first]

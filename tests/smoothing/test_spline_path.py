@@ -25,7 +25,7 @@ from planner.smoothing import spline_path
 from planner.smoothing.initial import greville_control
 from planner.smoothing.relax import REACH, WIDER, ControlWindow, Relaxed, relax, tighten_window
 from planner.smoothing.sites import site_distance, used_share, with_radius
-from planner.smoothing.spline_path import cusps, lost_joints, spline_shape, with_spline
+from planner.smoothing.spline_path import cusp_spans, lost_joints, spline_shape, with_spline
 
 MACHINE = problems.machine()
 seeds = st.integers(0, 10**6)
@@ -151,15 +151,16 @@ def test_a_cusp_is_found_at_the_joint_that_turns_there(before):
     toolpath = toolpath_from_program(problems.polyline(np.vstack([straight, corners])), MACHINE, None)
     path = round_corners(toolpath, MACHINE, BezierCorner(), blend_tangents=True)
     shape = spline_shape(path, MACHINE)
-    assert not cusps(shape.splines).any()
+    assert not shape.cusp.any()
     assert not len(lost_joints(path, shape))
     # six control points in one place: the curve stands still on the span between them
     span = len(shape.left) // 2
     control = shape.splines.control.copy()
     control[span : span + DEGREE + 1] = control[span]
     splines = shape.splines._replace(control=control)
-    assert cusps(splines).all()
-    lost = dataclasses.replace(shape, splines=splines._replace(fits=np.zeros(1, bool)))
+    assert cusp_spans(splines)[span]
+    none = splines._replace(fits=np.zeros(1, bool))
+    lost = dataclasses.replace(shape, splines=none, cusp=cusp_spans(splines))
     joints = lost_joints(path, lost)
     place = path.legs.place[joints]
     begin, end = splines.breaks[span], splines.breaks[span + 1]
@@ -179,6 +180,27 @@ def test_stops_at_cusps_keep_the_splines_around_them(shared_dir):
     after, shape = splined_with_stops(path, MACHINE, blend_tangents=True)
     assert shape.splines.fits.all()
     assert (after.joint == Joint.STOP).sum() > (path.joint == Joint.STOP).sum()
+
+
+@pytest.mark.parametrize("stops", [[20], [1, 2], [12, 25, 40], [30, 31, 59]])
+def test_splines_of_runs_that_a_stop_leaves_as_they_are_are_those_of_all_runs_again(stops):
+    """To the last bit, whichever runs stay: all but those around new stops."""
+    path = one_run()
+
+    def stopped(at):
+        of_stops = path.toolpath.with_joints(path.legs.first[np.array(at)], Joint.STOP)
+        return round_corners(of_stops, MACHINE, path.corner, blend_tangents=True)
+
+    before = spline_shape(stopped([15, 30, 45]), MACHINE)
+    new = stopped(sorted({15, 30, 45, *stops}))
+    shape, again = spline_shape(new, MACHINE, before), spline_shape(new, MACHINE)
+    assert len(shape.splines.fits) >= len(before.splines.fits)
+    for name in ("left", "cusp"):
+        np.testing.assert_array_equal(getattr(shape, name), getattr(again, name))
+    for mine, other in ((shape.splines, again.splines), (shape.splines.sites, again.splines.sites)):
+        for a, b in zip(mine, other, strict=True):
+            if isinstance(a, np.ndarray):
+                np.testing.assert_array_equal(a, b)
 
 
 def used_of_corridor(shape):

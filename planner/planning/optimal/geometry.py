@@ -51,7 +51,7 @@ def splined_with_stops(
             break
         stopping = rounded.toolpath.with_joints(at, Joint.STOP)
         rounded = round_corners(stopping, machine, rounded.corner, blend_tangents=blend_tangents)
-        shape = spline_shape(rounded, machine)
+        shape = spline_shape(rounded, machine, shape)
         tell_splines(shape, tell, len(at))
     return rounded, shape.laid()
 

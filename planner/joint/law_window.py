@@ -281,7 +281,9 @@ def _pin(laws: RunLaws, window: Window, which: Array, units: Units) -> tuple[Flo
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         here = values(middle)[many, column]
-        first = np.abs(np.log(here / before)) <= np.abs(np.log(here / behind))
+        with np.errstate(divide="ignore", invalid="ignore"):  # on one side nothing may be limited
+            nearer = np.abs(np.log(here / before)) <= np.abs(np.log(here / behind))
+        first = nearer | (here == before)
         low, high = np.where(first, middle, low), np.where(first, high, middle)
     # what only rises or falls fast has no jump between two places so near to each other
     jumped = _jumps(values(low)[many, column], values(high)[many, column])

@@ -56,6 +56,25 @@ def planned(*limits: object, **settings) -> Plan:
     return plan
 
 
+class Gate(planner.PathLimit):
+    """Slow on one side of a plane, and without a limit on the other."""
+
+    name = "gate"
+
+    def __init__(self, left: float, right: float):
+        self.left, self.right = left, right
+
+    def velocity(self, at):
+        return np.where(at.x < 12.3, self.left, self.right)
+
+
+@pytest.mark.parametrize("sides", [(45.0, np.inf), (np.inf, 45.0)])
+def test_no_limit_on_one_side_is_one_that_never_binds_there(sides: tuple[float, float]) -> None:
+    none, far = planned(Gate(*sides)), planned(Gate(*np.minimum(sides, 1e6)))
+    assert none.sentence.startswith(TOGETHER)
+    assert none.cycle_time == pytest.approx(far.cycle_time, rel=1e-3)
+
+
 @pytest.mark.parametrize("limit", [Guard(slow=1e4, push=1e6), Arm(by=100.0)])
 def test_what_never_binds_changes_nothing(limit: object) -> None:
     assert planned(limit).cycle_time == pytest.approx(planned().cycle_time, rel=1e-4)

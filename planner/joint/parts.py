@@ -99,8 +99,9 @@ class Spliced:
 
     @cached_property
     def _s(self) -> FloatArray:
-        """Arc lengths of `_pieces` (`Pieces.length`) [mm]."""
-        return np.concatenate([run.motion.s for run in self.runs if isinstance(run.motion, AxisMotion)])
+        """Arc lengths of `_pieces` (`Pieces.length`) [mm]; of a run without pieces one, as of all ends."""
+        motions = [run.motion for run in self.runs]
+        return np.concatenate([one.s if isinstance(one, AxisMotion) else np.zeros(1) for one in motions])
 
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's interpolation

@@ -71,7 +71,7 @@ class Pieces(NamedTuple):
 
     def length(self, s: FloatArray, of: Array, times: FloatArray) -> FloatArray:
         """(T,) arc length [mm] of the motions `of` (T,) at their times (T,) [s]; s (L + n,): `AxisMotion.s` of one after the
-        other."""
+        other, 0 of a motion without pieces."""
         found = np.empty(len(times))
         _put_lengths(self, s, of, times, found)
         return found

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from rest_motion import along_x
 
 from planner.joint.parts import Spliced, SplicedRun
+from planner.motion.slowed import Slowed
 
 JERK = 1e4
 FIRST, SECOND = along_x(1.0, JERK), along_x(2.0, JERK, start=1.0, slower=1.3)
@@ -35,6 +38,19 @@ def test_every_part_is_where_it_was():
         for name in ("position", "velocity", "acceleration"):
             np.testing.assert_allclose(getattr(there, name), getattr(own, name), atol=1e-9 * JERK)
         assert (np.diff(there.s) > 0).all()
+
+
+@pytest.mark.parametrize("slowed", [(0,), (1,), (0, 1)])
+def test_lengths_do_not_depend_on_how_motions_are_given(slowed):
+    """Axis by axis, all in one array, or each by itself."""
+    made, times = spliced(), np.linspace(0.0, spliced().end, 41)
+    runs = [
+        dataclasses.replace(run, motion=Slowed(motion=run.motion, places=())) if k in slowed else run
+        for k, run in enumerate(made.runs)
+    ]
+    other = Spliced(runs=tuple(runs))
+    np.testing.assert_allclose(other.at(times, 1e-3).s, made.at(times, 1e-3).s, atol=1e-9)
+    np.testing.assert_allclose(other.length[:3], made.length, atol=1e-9)
 
 
 def test_at_no_times_it_has_columns_without_rows():

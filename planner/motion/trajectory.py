@@ -75,7 +75,7 @@ class Trajectory:
     def __getattr__(self, name: str) -> Any:
         if name != "s" or "_length" not in vars(self):
             raise AttributeError(name)
-        object.__setattr__(self, "s", vars(self).pop("_length")())
+        object.__setattr__(self, "s", self._length())  # which stays: several threads may ask
         freeze(self, "s", np.float64, (len(self.t),))
         return self.s
 
@@ -105,7 +105,8 @@ class Trajectory:
     @property
     def length(self) -> Callable[[], FloatArray]:
         """What gives `s` (T,), which it is not asked for here."""
-        return vars(self).get("_length") or partial(np.asarray, self.s)
+        known = vars(self)
+        return known["_length"] if "_length" in known and "s" not in known else partial(np.asarray, self.s)
 
     def chunks(self) -> Iterator[Trajectory]:
         """All samples in order, one part after the other. What goes through a long motion takes its parts, so

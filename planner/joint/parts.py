@@ -6,6 +6,7 @@ they meet.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -109,8 +110,8 @@ class Spliced:
         of = np.clip(np.searchsorted(self.begin, times, side="right") - 1, 0, len(self.runs) - 1)
         begin, end, last = self._times
         local = np.minimum(begin[of] + (times - self.begin[of]), last[of])
-        columns = self._seen(of, np.minimum(local, end[of]))
-        columns["s"] = partial(self._lengths, of, np.minimum(local, end[of]))
+        within = np.minimum(local, end[of])
+        columns = self._seen(of, within) | {"s": partial(self._lengths, of, within)}
         over = local >= end[of]  # there another motion may begin
         for name in RATES:
             columns[name][over] = 0.0
@@ -127,11 +128,16 @@ class Spliced:
         here, found = by_axes[of], np.empty(len(of))
         if pieces is not None:
             found[here] = pieces.length(self._s, of[here], times[here])
-        for k in np.unique(of[~here]).tolist():
+        for part, seen, which in self._alone(np.unique(of[~here]), of, times):
+            found[part] = seen.s[which]
+        return found
+
+    def _alone(self, runs: Array, of: Array, times: FloatArray) -> Iterator[tuple[slice, Trajectory, Array]]:
+        """Of each of the `runs` (k,) where its times are, its motion at those that differ, and which of them each is."""
+        for k in runs.tolist():
             part = slice(*np.searchsorted(of, [k, k + 1]).tolist())
             single, which = np.unique(times[part], return_inverse=True)
-            found[part] = self.runs[k].motion.at(single, 1.0).s[which]
-        return found
+            yield part, self.runs[k].motion.at(single, 1.0), which
 
     def _seen(self, of: Array, times: FloatArray) -> dict[str, Any]:
         """The columns of the motions of the runs `of` (T,), ascending, at their times (T,), ascending too."""
@@ -140,13 +146,10 @@ class Spliced:
         parts: list[tuple[Array | slice, dict[str, Any]]] = []
         if pieces is not None:
             parts.append((here, pieces.at(of[here], times[here])))
-        others = np.unique(of[~here]).tolist()
-        if not (others or parts):  # without times there are the columns of the first run, without rows
-            others = [0]
-        for k in others:
-            part = slice(*np.searchsorted(of, [k, k + 1]).tolist())
-            single, which = np.unique(times[part], return_inverse=True)
-            seen = self.runs[k].motion.at(single, 1.0)
+        others = np.unique(of[~here])
+        if not (len(others) or parts):  # without times there are the columns of the first run, without rows
+            others = np.zeros(1, np.int64)
+        for part, seen, which in self._alone(others, of, times):
             names = ("position", "block", "line", *RATES)
             parts.append((part, {name: getattr(seen, name)[which] for name in names}))
         if len(parts) == 1:  # most motions are found as a whole, or kept

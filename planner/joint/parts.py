@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -21,7 +21,7 @@ from planner.joint.motion import Steps
 from planner.joint.run import TubeRun
 from planner.motion.axis_motion import AxisMotion, Pieces
 from planner.motion.timing import MotionInTime
-from planner.motion.trajectory import Trajectory
+from planner.motion.trajectory import Lengths, Trajectory
 
 # Times closer than this are the same [s]: rounding of sums of durations.
 SAME_TIME = 1e-9
@@ -111,7 +111,7 @@ class Spliced:
         begin, end, last = self._times
         local = np.minimum(begin[of] + (times - self.begin[of]), last[of])
         within = np.minimum(local, end[of])
-        columns = self._seen(of, within) | {"s": partial(self._lengths, of, within)}
+        columns = self._seen(of, within) | {"s": Lengths(self._lengths, (of, within))}
         over = local >= end[of]  # there another motion may begin
         for name in RATES:
             columns[name][over] = 0.0

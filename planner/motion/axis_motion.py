@@ -18,7 +18,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ from planner.base.arrays import Array, FloatArray, freeze, read_only
 from planner.base.kernels import njit
 from planner.base.search import last_not_after, nearest
 from planner.geometry.toolpath import Toolpath
-from planner.motion.trajectory import COLUMNS, Trajectory
+from planner.motion.trajectory import COLUMNS, Lengths, Trajectory
 
 # Arc lengths of a step by 5 Gauss points and by 2 x 5 agree to this fraction of it [-].
 QUADRATURE_ROUNDING = 1e-9
@@ -125,7 +125,7 @@ class AxisMotion:
     def at(self, times: FloatArray, dt: float) -> Trajectory:
         """The motion at ascending times (T,) within [0, end]; `dt` [s] is the trajectory's period."""
         of = np.zeros(len(times), dtype=np.int64)
-        columns = self.pieces.at(of, times) | {"s": partial(self._length, of, times)}
+        columns = self.pieces.at(of, times) | {"s": Lengths(self._length, (of, times))}
         return Trajectory(axes=self.axes, radius=self.radius, dt=dt, t=times, **columns)
 
     def _length(self, of: Array, times: FloatArray) -> FloatArray:

@@ -30,9 +30,9 @@ Beyond `FAR` reaches nothing is left of phi but rounding.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -196,7 +196,7 @@ class Slowed:
         r1, r2 = -(p1[:, None]) * r**3, (3.0 * p1**2 - p * p2)[:, None] * r**5
         v, a, j = (getattr(seen, name)[which] for name in ("velocity", "acceleration", "jerk"))
         kept: dict[str, Any] = {name: getattr(seen, name)[which] for name in ("position", "block", "line")}
-        kept["s"] = partial(_chosen, seen.length, which)
+        kept["s"] = seen.length.rows(which)
         return dataclasses.replace(
             seen,
             t=times,
@@ -212,10 +212,6 @@ class Slowed:
         new = np.stack([without_stands(self.stands, np.sort(at))[0], by[np.argsort(at)]], axis=1)
         stands = np.concatenate([self.stands, new])
         return dataclasses.replace(self, stands=stands[np.argsort(stands[:, 0], kind="stable")])
-
-
-def _chosen(length: Callable[[], FloatArray], which: Array) -> FloatArray:
-    return length()[which]
 
 
 def times_of_pieces(motion: MotionInTime) -> tuple[FloatArray, float]:

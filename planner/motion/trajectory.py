@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -17,9 +16,27 @@ from planner.machine import ROTARY_AXES
 
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "s", "feed", "block", "line")
 
-
 # A motion rests where it is slower than this share of its fastest [-]: digits of files, velocities from differences.
 AT_REST = 1e-3
+
+
+class Lengths(NamedTuple):
+    """Arc lengths of samples, for when they are asked for.
+
+    of      : gives them of columns (T,) each [mm]
+    columns : of the samples
+    """
+
+    of: Callable[..., FloatArray]
+    columns: tuple[Array, ...]
+
+    def __call__(self) -> FloatArray:
+        """(T,) [mm]."""
+        return self.of(*self.columns)
+
+    def rows(self, k: Array | slice) -> Lengths:
+        """Of the samples with ascending indices k (n,)."""
+        return Lengths(self.of, tuple(column[k] for column in self.columns))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -57,7 +74,7 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         samples, axes = len(self.t), len(self.axes)
-        if callable(self.s):  # a quadrature, which takes many times as long as all other columns
+        if isinstance(self.s, Lengths):  # a quadrature, which takes many times as long as all other columns
             object.__setattr__(self, "_length", self.s)
             object.__delattr__(self, "s")
         else:
@@ -103,10 +120,11 @@ class Trajectory:
         return in_degrees(self.axes, self.radius)
 
     @property
-    def length(self) -> Callable[[], FloatArray]:
-        """What gives `s` (T,), which it is not asked for here."""
+    def length(self) -> Lengths:
+        """What gives `s`, which it is not asked for here."""
         known = vars(self)
-        return known["_length"] if "_length" in known and "s" not in known else partial(np.asarray, self.s)
+        asked = "_length" in known and "s" not in known
+        return known["_length"] if asked else Lengths(np.asarray, (self.s,))
 
     def chunks(self) -> Iterator[Trajectory]:
         """All samples in order, one part after the other. What goes through a long motion takes its parts, so
@@ -119,7 +137,8 @@ class Trajectory:
 
     def rows(self, k: Array) -> Trajectory:
         """The samples with the ascending indices k (n,)."""
-        return dataclasses.replace(self, **{name: getattr(self, name)[k] for name in self.columns})
+        columns: dict[str, Any] = {name: getattr(self, name)[k] for name in self.columns if name != "s"}
+        return dataclasses.replace(self, **columns | {"s": self.length.rows(k)})
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -171,9 +190,14 @@ def joined(chunks: list[Trajectory]) -> Trajectory:
         for name in chunks[0].columns
         if name != "s"
     }
-    columns["s"] = partial(_lengths, [c.length for c in chunks], fresh)
+    lengths = [c.length.rows(slice(skip, None)) for c, skip in zip(chunks, fresh, strict=True)]
+    columns["s"] = _lengths_of_all(lengths)
     return dataclasses.replace(chunks[0], **columns)
 
 
-def _lengths(of_chunks: list[Callable[[], FloatArray]], fresh: list[int]) -> FloatArray:
-    return np.concatenate([length()[skip:] for length, skip in zip(of_chunks, fresh, strict=True)])
+def _lengths_of_all(parts: list[Lengths]) -> Lengths:
+    """Of one part after the other; of parts of several motions they are asked for at once."""
+    if any(part.of != parts[0].of for part in parts):
+        parts = [Lengths(np.asarray, (part(),)) for part in parts]
+    together = zip(*(part.columns for part in parts), strict=True)
+    return Lengths(parts[0].of, tuple(np.concatenate(columns) for columns in together))

@@ -13,7 +13,7 @@ from planner.base import threads
 from planner.base.sizes import USUAL
 from planner.motion import on_demand, timing
 from planner.motion.on_demand import TrajectoryOnDemand
-from planner.motion.trajectory import COLUMNS, Trajectory
+from planner.motion.trajectory import COLUMNS, Lengths, Trajectory, joined
 from planner.report import trajectory_file
 from planner.report.export import write_plan
 from planner.report.trajectory_file import write_trajectory
@@ -144,3 +144,35 @@ def test_the_verdict_is_the_same_on_any_number_of_threads(monkeypatch):
                 verdicts[0].limits[name].time,
                 verdicts[0].limits[name].line,
             )
+
+
+def test_the_arc_length_of_some_samples_is_not_asked_of_the_others():
+    asked = []
+
+    def of(times):
+        asked.append(len(times))
+        return times**2
+
+    t, rest = np.arange(10.0), np.zeros((10, 1))
+    block = np.zeros(10, np.int64)
+    whole = Trajectory(
+        axes=("X",),
+        dt=1.0,
+        t=t,
+        position=rest,
+        velocity=rest,
+        acceleration=rest,
+        jerk=rest,
+        s=Lengths(of, (t,)),
+        feed=t,
+        block=block,
+        line=block,
+    )
+    some = joined([whole.rows(np.array([1, 3, 4])), whole.rows(np.array([4, 7, 9]))]).rows(
+        np.array([0, 2, 4])
+    )
+    assert asked == []
+    assert some.s.tolist() == [1.0, 16.0, 81.0]
+    assert asked == [3]
+    both = joined([some, dataclasses.replace(whole, t=9.0 + t, s=t)])
+    assert both.s.tolist() == [1.0, 16.0, 81.0, *t[1:]]

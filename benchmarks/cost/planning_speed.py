@@ -1,4 +1,4 @@
-"""How long the motion takes and how long planning takes, for three jobs and every effort, next to earlier commits.
+"""How long the motion takes and how long planning takes, for four jobs and every effort, next to earlier commits.
 
 Every plan is made in a process of its own, twice: the first time kernels are loaded or compiled, the second time counts. Processor
 seconds are those of the whole process in the second plan, on all cores; peak memory is that of both. Earlier commits are checked out
@@ -25,10 +25,12 @@ from planner.base.names import EFFORTS
 ROOT = Path(__file__).resolve().parents[2]
 PEERS = ROOT.parent / "shared" / "machines" / "peers.toml"
 PROGRAMS = ROOT.parent / "shared" / "peers" / "programs"
+VCARVE = ROOT.parent / "shared" / "nc" / "CauldronDevelopmentLLC__CAMotics__vcarve.ngc"
 JOBS = {  # programs and their machines
     "bracket": (ROOT / "planner" / "examples" / "bracket.ngc", "mill"),
     "star and spiral": (PROGRAMS / "d_starspiral.ngc", str(PEERS)),
     "chips": (PROGRAMS / "e_chips.ngc", str(PEERS)),
+    "vcarve": (VCARVE, str(PEERS)),
 }
 
 CHILD = """

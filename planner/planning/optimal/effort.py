@@ -31,7 +31,7 @@ FIRST_GAP, SECOND_GAP = 1e-3, 1e-5
 # Of large motions.
 LARGE_GAP = 1e-4
 # For the best of efforts.
-BEST_CUT, BEST_GAP = Cut(per_unit=8.0, of_leg=2.0), 1e-6
+BEST_CUT, BEST_GAP = Cut(per_unit=8.0, of_leg=1.0), 1e-6
 
 
 class Grids(NamedTuple):

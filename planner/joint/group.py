@@ -1,8 +1,11 @@
 """Windows that are searched side by side (interior_point.py), one in each lane: their steps one after the other,
-numbers of all windows behind each other in the last dimension, filled up to the longest one with steps that have
-no rows.
+numbers of all lanes behind each other in the last dimension, filled up to the longest window with steps that have
+no rows. There may be more windows than lanes: they wait in a queue, from which a lane takes the next one where its own has
+ended.
 """
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -84,6 +87,22 @@ class Group(NamedTuple):
     aside: FloatArray  # (1, W)
 
 
+class Motion(NamedTuple):
+    """Of the windows in lanes, how they are searched and what is found in them so far."""
+
+    x: FloatArray  # (N+1, S, W) the nodes
+    u: FloatArray  # (N, C, W) the controls
+    place: FloatArray  # (N, 6, W)
+    tuning: FloatArray  # (7, W)
+
+
+class Queue(NamedTuple):
+    """The numbers of a group and its motion one after the other, in one array."""
+
+    lanes: FloatArray  # (n, W) what `Group` and `Motion` are views of
+    windows: FloatArray  # (Q, n) of each window
+
+
 class Held(NamedTuple):
     """Of a window that is searched by itself, what windows in lanes have not: their kernel is compiled without it."""
 
@@ -103,44 +122,55 @@ _FILL = {
 
 
 def group_of(
-    windows: list[StepWindow], width: int
-) -> tuple[Sizes, Group, Held | None, FloatArray, FloatArray, FloatArray]:
-    """Up to `width` windows of one kind (window_solver.py), and x (N+1, S, W), u (N, C, W), place (N, 6, W) of them."""
+    windows: Sequence[StepWindow], tuning: Sequence[Sequence[float]], width: int
+) -> tuple[Sizes, Group, Motion, Queue, Held | None]:
+    """Windows of one kind (window_solver.py), each with its tuning (7,), for a group of `width` lanes, the first ones in them."""
     of = windows[0].u.shape[1] - 1
     axes = next((many for many in AXES if many >= of), of)
     N = max(len(one.u) for one in windows)
     R = 8 * (axes - of) + max(one.limits.on.shape[1] for one in windows)
     bends = int(any(one.legs.radius.any() for one in windows))
     vectors = (N * bends, 3, axes)
-    shapes = {
+    shapes: dict[str, tuple[int, ...]] = {
         **dict.fromkeys(Group._fields, (N,)),
         **dict.fromkeys(("base", "drift", "start", "switch_at", "side"), (N, axes)),
         **{"on": (N, R), "target": vectors, "way": vectors, "rate": (N * bends,), "shape": (N * bends, 6)},
         **{"per_box": (4, axes), "sag": (SETS,), "rest": (N, 2, axes), "aside": (1,)},
+        **{"x": (N + 1, 3 * axes), "u": (N, axes + 1), "place": (N, 3 * SETS), "tuning": (len(tuning[0]),)},
     }
-    group = Group(*(np.full((*shapes[name], width), _FILL.get(name, 0.0)) for name in Group._fields))
-    x, u = np.zeros((N + 1, 3 * axes, width)), np.zeros((N, axes + 1, width))
-    u[:, axes] = 1.0
-    place = np.zeros((N, 3 * SETS, width))
-    for lane, one in enumerate(windows):
+    fill = np.zeros(sum(map(math.prod, shapes.values())))
+    group, motion = _views(fill[:, None], shapes)
+    for name, value in _FILL.items():
+        getattr(group, name)[:] = value
+    motion.u[:, axes], motion.tuning[:] = 1.0, 1.0
+    queue = Queue(np.repeat(fill[:, None], width, axis=1), np.repeat(fill[None], len(windows), axis=0))
+    bound, normal, switch = False, False, False
+    for one, tuned, numbers in zip(windows, tuning, queue.windows, strict=True):
+        group, motion = _views(numbers[:, None], shapes)
         legs, limits = one.legs, one.limits
         of_legs = legs.length, legs.base, legs.drift, legs.e1, legs.radius
         of_steps = tuple(getattr(limits, name) for name in _OF_STEPS.split())
-        put_window(group, lane, of_legs, _formulas_of(legs, bends), of_steps, limits.box, limits.sag)
-        put_motion((x, u, place), lane, (one.x, one.u, one.place))
-        group.aside[0, lane] = limits.aside
-    first, on = windows[0].limits, group.on
-    normal, laws = bool(group.bound.any()), len(first.laws.kind) > 0
-    held = Held(first.laws, place_of(of, axes)) if width == 1 else None
-    which = (
-        bends,
-        normal or laws,
-        normal or bool(on[:, 8 * axes + NORMAL_NODE].any()),
-        laws,
-        bool(on[:, 8 * axes + SWITCH].any()),
-    )
+        put_window(group, 0, of_legs, _formulas_of(legs, bends), of_steps, limits.box, limits.sag)
+        put_motion((motion.x, motion.u, motion.place), 0, (one.x, one.u, one.place))
+        group.aside[0, 0], motion.tuning[:, 0] = limits.aside, tuned
+        bound = bound or bool(group.bound.any())
+        normal = normal or bool(group.on[:, 8 * axes + NORMAL_NODE].any())
+        switch = switch or bool(group.on[:, 8 * axes + SWITCH].any())
+    queue.lanes[:, : len(windows)] = queue.windows[:width].T
+    group, motion = _views(queue.lanes, shapes)
+    laws = windows[0].limits.laws
+    held = Held(laws, place_of(of, axes)) if width == 1 else None
+    which = (bends, bound or len(laws.kind) > 0, bound or normal, len(laws.kind) > 0, switch)
     sizes = Sizes(size(axes), size(3 * axes), size(axes + 1), size(4 * axes + 1), size(width), N, R, *which)
-    return sizes, group, held, x, u, place
+    return sizes, group, motion, queue, held
+
+
+def _views(numbers: FloatArray, shapes: dict[str, tuple[int, ...]]) -> tuple[Group, Motion]:
+    """What numbers (n, W) are, as arrays of the `shapes` (.., W)."""
+    sizes = [math.prod(shape) for shape in shapes.values()]
+    parts, width = np.split(numbers, np.cumsum(sizes)[:-1]), numbers.shape[1]
+    found = [part.reshape(*shape, width) for part, shape in zip(parts, shapes.values(), strict=True)]
+    return Group(*found[: len(Group._fields)]), Motion(*found[len(Group._fields) :])
 
 
 _OF_STEPS = (

@@ -20,8 +20,10 @@ from planner.base.sizes import SIZES
 from planner.base.threads import side_by_side, threads
 from planner.joint.window_solver import Asked, Solved, kind_of, solve_windows
 
-# Windows that wait when a group is put together, if there are so many.
-WAITING = 8 * WIDTH
+# Windows that wait when a group is put together, if there are so many, and of a group: its lanes take one after the other, so
+# that lanes whose windows take few iterations do not idle.
+WAITING, QUEUE = 8 * WIDTH, 4 * WIDTH
+ALIKE = 0.8  # of the longest of a group, how long those are that wait for a lane at least [-]
 IN_LANES = SIZES.searched_in_lanes  # steps: windows of searches of fewer together are solved one at a time
 QUIET = SIZES.windows_shared  # steps: searches of fewer together are worth no thread
 Task = Generator[Asked, Solved, None]
@@ -74,15 +76,20 @@ class Sort(NamedTuple):
     kind: Hashable | None
 
 
-def together(waiting: list[Sort]) -> list[int]:
-    """Which windows to solve next: the longest of those that are solved by themselves; where there are none, `WIDTH` of one
-    kind at most, those that leave least of a group as long as its longest idle."""
+def together(waiting: list[Sort], most: int = QUEUE) -> list[int]:
+    """Which windows to solve next: the longest of those that are solved by themselves; where there are none, up to `most` of one
+    kind, those that leave least of lanes as long as their longest idle; more than lanes only where they are `ALIKE`."""
     of_kind: dict[Hashable | None, list[int]] = {}
     for at in sorted(range(len(waiting)), key=lambda at: -waiting[at].steps):
         of_kind.setdefault(waiting[at].kind, []).append(at)
     if None in of_kind:
         return of_kind[None][:1]
-    groups = (of[k : k + WIDTH] for of in of_kind.values() for k in range(max(len(of) - WIDTH, 0) + 1))
+
+    def group(of: list[int], k: int) -> list[int]:
+        least = ALIKE * waiting[of[k]].steps
+        return [at for n, at in enumerate(of[k : k + most]) if n < WIDTH or waiting[at].steps >= least]
+
+    groups = (group(of, k) for of in of_kind.values() for k in range(max(len(of) - WIDTH, 0) + 1))
     return max(groups, key=lambda group: sum(waiting[at].steps for at in group) / waiting[group[0]].steps)
 
 
@@ -140,7 +147,8 @@ class Groups:
                 return partial(self._go_on, new)
         if not self._ready:
             return None
-        group = together([one.sort for one in self._ready])
+        most = min(QUEUE, max(WIDTH, len(self._ready) // threads()))  # leaves some for the other threads
+        group = together([one.sort for one in self._ready], most)
         solve = partial(self._solve, [self._ready[at] for at in group])
         self._ready = [one for at, one in enumerate(self._ready) if at not in group]
         return solve

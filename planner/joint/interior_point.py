@@ -13,7 +13,7 @@ farther than that holds for the kinematics, but for `BENT`: along a phase of con
 nothing else. A change of the velocity costs too where the normal acceleration is limited (normal_rows.py).
 
 A window is searched on single numbers, or several side by side, one in each lane (base/lanes.py): what is found in one does
-not depend on the others, and a window that has ended waits for the last one.
+not depend on the others. A lane whose window has ended takes the next one of the queue, or idles until the others have ended.
 
 Where a phase of constant jerk is cut into steps does not matter, and the search would go on among equal
 optima for ever. When the complementarity s.z has reached what is asked for and the time has settled, prox
@@ -28,6 +28,7 @@ from planner.base.arrays import Array, FloatArray
 from planner.base.kernels import CONTRACT, njit
 from planner.base.lanes import anywhere, larger, magnitude, pick, put, root, smaller, where
 from planner.base.views import vector, wide1, wide2, wide3
+from planner.joint.bends import tangent_at
 from planner.joint.memory import PLACES, THREE, lanes_of, room_of, rows_in, scratch_of
 from planner.joint.recursion import END, Factor, backward, factor_steps, forward, gaps
 from planner.joint.row_kinds import SETS, TUBE_NODE
@@ -78,39 +79,53 @@ class Tuning(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Of all lanes, set as each of them ends."""
+    """Of all Q windows, set as each of them ends."""
 
-    x: FloatArray
-    u: FloatArray
-    place: FloatArray
-    z: FloatArray
-    done: Array  # (W,)
-    iterations: Array  # (W,)
+    x: FloatArray  # (Q, N+1, S)
+    u: FloatArray  # (Q, N, C)
+    place: FloatArray  # (Q, N, 6)
+    z: FloatArray  # (Q, N, R)
+    done: Array  # (Q,)
+    iterations: Array  # (Q,)
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_present(sizes, group, rows):
-    """Set which rows there are, with slacks of 1. Returns how many."""
-    count = 0.0 * group.real[0]
+def put_present(sizes, group, rows, new):
+    """Of lanes where `new` is 1 set which rows there are, with slacks of 1, and of lines the tangents. Returns how many rows
+    each lane has."""
+    count, fresh = 0.0 * new, new > 0.0
     for i in range(sizes.steps):
         for r in range(sizes.rows):
-            rows.s[i, r], rows.per_s[i, r] = 1.0, group.on[i, r]
-            count += group.on[i, r]
+            on = group.on[i, r]
+            rows.s[i, r], rows.per_s[i, r] = (
+                where(fresh, 1.0, rows.s[i, r]),
+                where(fresh, on, rows.per_s[i, r]),
+            )
+            rows.ds[i, r], rows.dz[i, r] = where(fresh, 0.0, rows.ds[i, r]), where(fresh, 0.0, rows.dz[i, r])
+            count += on
+        if sizes.bends > 0:
+            for c in range(3 * SETS):
+                at = tangent_at(sizes, i, c)
+                rows.by_node[i, c] = where(fresh, 0.0, rows.by_node[i, c])
+                for k in range(len(sizes.axes)):
+                    rows.tangent[at, k] = where(fresh, group.drift[i, k], rows.tangent[at, k])
     return count
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _start(sizes, rows, count, time, tuning):
-    """Slacks and multipliers of a start. Returns the sum of s z, and the largest row."""
-    products, broken = 0.0 * time, 0.0 * time
+def _start(sizes, group, rows, new, count, time, tuning):
+    """Slacks and multipliers of a start where `new` is 1. Returns the sum of s z there, and the largest row."""
+    products, broken, fresh = 0.0 * new, 0.0 * new, new > 0.0
     for i in range(sizes.steps):
         for r in range(sizes.rows):
-            there, g = rows.per_s[i, r] > 0.0, rows.g[i, r]
+            there, g = group.on[i, r] > 0.0, rows.g[i, r]
             s = where(there, larger(-g, tuning.first_slack), 1.0)
             z = where(there, tuning.first_gap * time / (count * s), 0.0)
             per = where(there, 1.0 / s, 0.0)
-            rows.s[i, r], rows.z[i, r], rows.per_s[i, r], rows.q[i, r] = s, z, per, z * (g + s) * per
             products, broken = products + s * z, larger(g, broken)
+            rows.s[i, r], rows.z[i, r] = where(fresh, s, rows.s[i, r]), where(fresh, z, rows.z[i, r])
+            rows.per_s[i, r] = where(fresh, per, rows.per_s[i, r])
+            rows.q[i, r] = where(fresh, z * (g + s) * per, rows.q[i, r])
     return products, broken
 
 
@@ -125,25 +140,37 @@ def _durations(sizes, group, u, zero):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def _end(sizes, lane, done, iteration, group, rows, x, u, found):
-    """Set what one lane has come to. What holds a node off its leg against the pull does so for the time, like the row
-    itself."""
-    found.done[lane], found.iterations[lane] = done, iteration
+def _end(sizes, lane, at, done, iterations, group, rows, x, u, found):
+    """Set what window `at`, in one lane, has come to. What holds a node off its leg against the pull does so for the time, like
+    the row itself."""
+    found.done[at], found.iterations[at] = done, iterations
     N, R = sizes.steps, sizes.rows
     tube = 8 * len(sizes.axes) + TUBE_NODE
     for i in range(N + 1):
         for s in range(len(sizes.state)):
-            found.x[i, s] = put(found.x[i, s], lane, pick(x[i, s], lane))
+            found.x[at, i, s] = pick(x[i, s], lane)
     for i in range(N):
         for c in range(len(sizes.control)):
-            found.u[i, c] = put(found.u[i, c], lane, pick(u[i, c], lane))
+            found.u[at, i, c] = pick(u[i, c], lane)
         for c in range(3 * SETS):
-            found.place[i, c] = put(found.place[i, c], lane, pick(rows.place[i, c], lane))
+            found.place[at, i, c] = pick(rows.place[i, c], lane)
         for r in range(R):
             z = pick(rows.z[i, r], lane)
             if r == tube:
                 z += pick(group.centre[i], lane) * (1.0 + 2.0 * pick(rows.g[i, r], lane))
-            found.z[i, r] = put(found.z[i, r], lane, z)
+            found.z[at, i, r] = z
+
+
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT)
+def _ended(sizes, at, reached, over, turns, active, group, rows, x, u, found):
+    """Set what the windows `at` (W,) have come to in active lanes where `over` is not 0. Returns which lanes stay active."""
+    if anywhere(active * over > 0.0):
+        for lane in range(len(sizes.width)):
+            if pick(active, lane) > 0.0 and pick(over, lane) > 0.0:
+                done, iterations = pick(reached, lane) > 0.0, int(pick(turns, lane))
+                _end(sizes, lane, at[lane], done, iterations, group, rows, x, u, found)
+                active = put(active, lane, 0.0)
+    return active
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
@@ -157,23 +184,14 @@ def _go(sizes, x, u, factor, along):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT, nogil=True)
-def solve_group(sizes, numbers, held, motion, tuning, work, found):
-    """Search the windows of a group (group.py) from their motion x (N+1, 3 A, W), u (N, A+1, W) and place (N, 6, W),
-    which is overwritten; tuning (7, W). What each comes to is set in `found`."""
+def solve_group(sizes, numbers, motion, queue, held, work, found):
+    """Search the windows of a queue in the lanes of a group (group.py), whose numbers and motion are overwritten. What each
+    comes to is set in `found`."""
     width, group = sizes.width, lanes_of(sizes, numbers)
-    R, S = sizes.rows, len(sizes.state)
-    x, u = wide2(motion[0], width, sizes.state), wide2(motion[1], width, sizes.control)
-    rows = rows_in(sizes, work, wide2(motion[2], width, PLACES))
-    tuned = wide1(tuning, width)
-    tune = Tuning(tuned[0], tuned[1], tuned[2], tuned[3], tuned[4], tuned[5], tuned[6])
-    ends = Found(
-        wide2(found.x, width, sizes.state),
-        wide2(found.u, width, sizes.control),
-        wide2(found.place, width, PLACES),
-        wide2(found.z, width, R),
-        found.done,
-        found.iterations,
-    )
+    S, W, Q = len(sizes.state), len(sizes.width), len(queue.windows)
+    x, u = wide2(motion.x, width, sizes.state), wide2(motion.u, width, sizes.control)
+    rows = rows_in(sizes, work, wide2(motion.place, width, PLACES))
+    tuned = wide1(motion.tuning, width)
     factor = Factor(
         wide3(work.K, width, sizes.control, sizes.state),
         wide3(work.L, width, sizes.control, sizes.control),
@@ -183,21 +201,52 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
     )
     gap = wide2(work.gap, width, sizes.state)
     room, scratch = room_of(sizes, work, x), scratch_of(sizes, held)
-    zero = 0.0 * tune.pull
+    zero = 0.0 * tuned[0]
     lambda_end, change = vector(x, sizes.state), vector(x, sizes.state)
     for k in range(S):
         lambda_end[k] = zero
     looking = room.y, wide2(work.nearest, width, THREE), wide1(work.top, width)
-    count = put_present(sizes, group, rows)
-    put_rows(sizes, group, held, x, u, rows, zero, zero, looking, scratch)
-    gap_most, off = gaps(sizes, group, x, u, gap)
-    time = _durations(sizes, group, u, zero)
-    products, broken = _start(sizes, rows, count, time, tune)
-    owed = zero + np.inf  # nothing has ended before the first step
-    prox, before, close, still, settled = tune.prox, time, zero, zero, zero
-    rho, off_before, slow = zero + END, zero + np.inf, zero
-    active = group.real[0]
-    for iteration in range(ITERATIONS + 1):
+    at, taken = np.zeros(W, np.int64), 0  # the window in each lane, and how many have been taken
+    active, along, dual, count, time, products, gap_most, off = zero, zero, zero, zero, zero, zero, zero, zero
+    prox, before, close, still, settled, turns = zero, zero, zero, zero, zero, zero
+    rho, off_before, slow = zero, zero, zero
+    while True:
+        new = zero
+        for lane in range(W):
+            if taken < Q and not pick(active, lane) > 0.0:
+                at[lane] = taken
+                if taken >= W:  # the first ones are there
+                    for n in range(len(queue.lanes)):
+                        queue.lanes[n, lane] = queue.windows[taken, n]
+                new, taken = put(new, lane, 1.0), taken + 1
+        tune = Tuning(tuned[0], tuned[1], tuned[2], tuned[3], tuned[4], tuned[5], tuned[6])
+        begins = anywhere(new > 0.0)
+        if begins:
+            fresh = new > 0.0
+            present, lasting = put_present(sizes, group, rows, new), _durations(sizes, group, u, zero)
+            count, time, before = (
+                where(fresh, present, count),
+                where(fresh, lasting, time),
+                where(fresh, lasting, before),
+            )
+            close, still, settled = (
+                where(fresh, zero, close),
+                where(fresh, zero, still),
+                where(fresh, zero, settled),
+            )
+            slow, turns = where(fresh, zero, slow), where(fresh, zero, turns)
+            prox, rho = where(fresh, tune.prox, prox), where(fresh, zero + END, rho)
+            off_before, active = where(fresh, zero + np.inf, off_before), where(fresh, zero + 1.0, active)
+            along, dual = where(fresh, zero, along), where(fresh, zero, dual)
+            for k in range(S):
+                lambda_end[k] = where(fresh, zero, lambda_end[k])
+            gap_most, off = gaps(sizes, group, x, u, gap)
+        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)
+        if begins:
+            fresh = new > 0.0
+            first, most = _start(sizes, group, rows, new, count, time, tune)
+            products, broken = where(fresh, first, products), where(fresh, most, broken)
+            owed = where(fresh, zero + np.inf, owed)  # nothing has ended before the first step
         now = _durations(sizes, group, u, zero)
         close = where(products <= 2.0 * tune.gap * time, close + 1.0, zero)
         rests = where(magnitude(now - before) <= STILL * tune.gap * time, still + 1.0, zero)
@@ -215,16 +264,12 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
         off_before = where(settled > 0.0, off, off_before)
         holds = where(broken <= tune.missed, where(owed <= OWED * tune.gap * time, settled, zero), zero)
         reached = where(gap_most <= OFF, holds, zero)
-        lost = where(products <= LOST * time, zero, 1.0 + zero)
-        if iteration == ITERATIONS:
-            lost = 1.0 + zero
-        if anywhere(active * (reached + lost) > 0.0):
-            for lane in range(len(sizes.width)):
-                if pick(active, lane) > 0.0 and pick(reached + lost, lane) > 0.0:
-                    _end(sizes, lane, pick(reached, lane) > 0.0, iteration, group, rows, x, u, ends)
-                    active = put(active, lane, 0.0)
+        lost = where(products <= LOST * time, where(turns < ITERATIONS, zero, 1.0 + zero), 1.0 + zero)
+        active = _ended(sizes, at, reached, reached + lost, turns, active, group, rows, x, u, found)
         if not anywhere(active > 0.0):
-            break
+            if taken == Q:
+                break
+            continue
         bad = factor_steps(
             sizes, group, held, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
         )
@@ -234,11 +279,7 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
             bad = factor_steps(
                 sizes, group, held, x, u, gap, rows, tune.pull, prox, rho, lambda_end, factor, room, scratch
             )
-        if anywhere(active * bad > 0.0):
-            for lane in range(len(sizes.width)):
-                if pick(active, lane) > 0.0 and pick(bad, lane) > 0.0:
-                    _end(sizes, lane, False, iteration, group, rows, x, u, ends)
-                    active = put(active, lane, 0.0)
+        active = _ended(sizes, at, zero, bad, turns, active, group, rows, x, u, found)
         along, dual, s_dz, z_ds, ds_dz = forward(
             sizes, group, x, u, gap, rows, True, zero, zero, factor, room, change
         )
@@ -264,4 +305,4 @@ def solve_group(sizes, numbers, held, motion, tuning, work, found):
             gap_most, off = gaps(sizes, group, x, u, gap)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]
-        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)
+        turns = turns + 1.0

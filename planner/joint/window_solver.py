@@ -37,31 +37,28 @@ def kind_of(asked: Asked) -> Hashable | None:
 
 
 def solve_windows(asked: Sequence[Asked], width: int) -> list[Solved]:
-    """Solve `width` windows of one kind at most: in lanes, or one on single numbers, which rounds in another order. What is
+    """Solve windows of one kind, `width` at a time: in lanes, or one on single numbers, which rounds in another order. What is
     found in one of them does not depend on the others."""
-    sizes, group, held, *motion = group_of([one.window for one in asked], width)
-    tuning = np.ones((len(Tuning._fields), width))
-    tuning[:, : len(asked)] = np.array([one.tuning for one in asked]).T
-    x, u, place = motion
-    found = Found(
-        np.zeros_like(x),
-        np.zeros_like(u),
-        np.zeros_like(place),
-        np.zeros(group.on.shape),
-        np.zeros(width, np.bool_),
-        np.zeros(width, np.int64),
+    sizes, group, motion, queue, held = group_of(
+        [one.window for one in asked], [one.tuning for one in asked], width
     )
-    solve_group(sizes, group, held, tuple(motion), tuning, work_of(sizes, group), found)
-    return [_solved(one.window, lane, found) for lane, one in enumerate(asked)]
+    of_each = (motion.x, motion.u, motion.place, group.on)
+    found = Found(
+        *(np.zeros((len(asked), *one.shape[:-1])) for one in of_each),
+        np.zeros(len(asked), np.bool_),
+        np.zeros(len(asked), np.int64),
+    )
+    solve_group(sizes, group, motion, queue, held, work_of(sizes, group), found)
+    return [_solved(one.window, k, found) for k, one in enumerate(asked)]
 
 
-def _solved(window: StepWindow, lane: int, found: Found) -> Solved:
-    """What was found in a lane; x, u and place go into the window."""
+def _solved(window: StepWindow, k: int, found: Found) -> Solved:
+    """What was found in window k of a group; x, u and place go into the window."""
     N, R = window.limits.on.shape
-    of, axes = window.u.shape[1] - 1, found.u.shape[1] - 1
+    of, axes = window.u.shape[1] - 1, found.u.shape[2] - 1
     at = place_of(of, axes)
-    window.x[:] = found.x[: N + 1, at[: 3 * of], lane]
-    window.u[:] = found.u[:N, at[3 * of :] - 3 * axes, lane]
-    window.place[:] = found.place[:N, :, lane]
-    z = found.z[:N, rows_of(of, axes, R), lane]
-    return Solved(bool(found.done[lane]), int(found.iterations[lane]), z)
+    window.x[:] = found.x[k, : N + 1, at[: 3 * of]].T
+    window.u[:] = found.u[k, :N, at[3 * of :] - 3 * axes].T
+    window.place[:] = found.place[k, :N]
+    z = np.ascontiguousarray(found.z[k, :N, rows_of(of, axes, R)].T)
+    return Solved(bool(found.done[k]), int(found.iterations[k]), z)

@@ -33,8 +33,8 @@ class Alone(NamedTuple):
 
     @classmethod
     def of(cls, window: Any) -> Alone:
-        sizes, group, held, x, u, place = group_of([window], 1)
-        return cls(sizes, group, held, x, u, place, work_of(sizes, group))
+        sizes, group, motion, _, held = group_of([window], [[1.0] * 7], 1)
+        return cls(sizes, group, held, motion.x, motion.u, motion.place, work_of(sizes, group))
 
 
 LOOK, SLOPES, MODELS, NEWTON, GAPS = range(5)
@@ -49,7 +49,7 @@ def _piece(what, sizes, numbers, held, x, u, place, work, change, out, settings,
     gap, scratch = wide2(work.gap, w, sizes.state), scratch_of(sizes, held)
     if what == LOOK:
         looking = room.y, wide2(work.nearest, w, _THREE), wide1(work.top, w)
-        put_present(sizes, group, rows)
+        put_present(sizes, group, rows, 1.0)
         put_rows(sizes, group, held, at, control, rows, 0.0, 0.0, looking, scratch)
     elif what == GAPS:
         gaps(sizes, group, at, control, gap)

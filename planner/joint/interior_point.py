@@ -59,6 +59,9 @@ BENT, BENT_OF, BENT_CLOSE = 0.05, 0.3, 0.005
 # By how much prox grows with every step that is shortened once the complementarity is reached, and how far [-]: where steps
 # are too long for ever, windows run round and round.
 WARY, WARIEST = 2.0, 10.0
+# A row's s z is this share of what a step aims at, at least [-]: rows whose z is less hold steps up as soon as s is small, and windows
+# went on to the last iteration (as in ipopt, which resets z further off: Waechter and Biegler 2006, eq. 16).
+CENTRED = 0.1
 # What rows may be off their slacks at the end, each times its multiplier, as a share of the complementarity [-].
 OWED = 0.1
 LOST = 1e3  # complementarity from which no search has come back, share of the time [-]
@@ -209,7 +212,7 @@ def solve_group(sizes, numbers, motion, queue, held, work, found):
     at, taken = np.zeros(W, np.int64), 0  # the window in each lane, and how many have been taken
     active, along, dual, count, time, products, gap_most, off = zero, zero, zero, zero, zero, zero, zero, zero
     prox, before, close, still, settled, turns = zero, zero, zero, zero, zero, zero
-    rho, off_before, slow = zero, zero, zero
+    rho, off_before, slow, least = zero, zero, zero, zero
     while True:
         new = zero
         for lane in range(W):
@@ -237,11 +240,17 @@ def solve_group(sizes, numbers, motion, queue, held, work, found):
             slow, turns = where(fresh, zero, slow), where(fresh, zero, turns)
             prox, rho = where(fresh, tune.prox, prox), where(fresh, zero + END, rho)
             off_before, active = where(fresh, zero + np.inf, off_before), where(fresh, zero + 1.0, active)
-            along, dual = where(fresh, zero, along), where(fresh, zero, dual)
+            along, dual, least = (
+                where(fresh, zero, along),
+                where(fresh, zero, dual),
+                where(fresh, zero, least),
+            )
             for k in range(S):
                 lambda_end[k] = where(fresh, zero, lambda_end[k])
             gap_most, off = gaps(sizes, group, x, u, gap)
-        products, broken, owed = put_rows(sizes, group, held, x, u, rows, along, dual, looking, scratch)
+        products, broken, owed = put_rows(
+            sizes, group, held, x, u, rows, along, dual, least, looking, scratch
+        )
         if begins:
             fresh = new > 0.0
             first, most = _start(sizes, group, rows, new, count, time, tune)
@@ -305,4 +314,4 @@ def solve_group(sizes, numbers, motion, queue, held, work, found):
             gap_most, off = gaps(sizes, group, x, u, gap)
         for k in range(S):
             lambda_end[k] += along * rho * change[k]
-        turns = turns + 1.0
+        turns, least = turns + 1.0, CENTRED * aim

@@ -231,10 +231,11 @@ def tangent_of(sizes, rows, i, c, k):
 
 
 @njit(cache=True, error_model="numpy", fastmath=CONTRACT)
-def put_rows(sizes, group, held, x, u, rows, along, dual, room, scratch):
+def put_rows(sizes, group, held, x, u, rows, along, dual, least, room, scratch):
     """Put the rows at the nodes x (N+1, 3 A) and the controls u (N, A+1) into `rows`, whose places are where the search
-    on arcs begins, and slacks and multipliers after the shares `along` and `dual` of their steps. Returns the sum of s z,
-    the largest row, and the sum of z |g + s|: in units of time, what rows are off their slacks. A row that is not there is -1.
+    on arcs begins, and slacks and multipliers after the shares `along` and `dual` of their steps, their product `least` at
+    least. Returns the sum of s z, the largest row, and the sum of z |g + s|: in units of time, what rows are off their slacks.
+    A row that is not there is -1.
     room: y (18, A), nearest (N, 3) and top (N,)."""
     axes, N, R = len(sizes.axes), sizes.steps, sizes.rows
     y, nearest, top = room
@@ -299,6 +300,7 @@ def put_rows(sizes, group, held, x, u, rows, along, dual, room, scratch):
             g_r = where(there, g[r], -1.0)
             s_r, z_r = rows.s[i, r] + along * rows.ds[i, r], rows.z[i, r] + dual * rows.dz[i, r]
             per = where(there, 1.0 / s_r, 0.0)
+            z_r = larger(z_r, least * per)
             g[r], rows.s[i, r], rows.z[i, r], rows.per_s[i, r] = g_r, s_r, z_r, per
             rows.q[i, r] = z_r * (g_r + s_r) * per
             products += s_r * z_r

@@ -42,12 +42,9 @@ def solve_windows(asked: Sequence[Asked], width: int) -> list[Solved]:
     sizes, group, motion, queue, held = group_of(
         [one.window for one in asked], [one.tuning for one in asked], width
     )
-    of_each = (motion.x, motion.u, motion.place, group.on)
-    found = Found(
-        *(np.zeros((len(asked), *one.shape[:-1])) for one in of_each),
-        np.zeros(len(asked), np.bool_),
-        np.zeros(len(asked), np.int64),
-    )
+    count, of_each = len(asked), (motion.x, motion.u, motion.place, group.on)
+    x, u, place, z = (np.zeros((count, *one.shape[:-1])) for one in of_each)
+    found = Found(x, u, place, z, np.zeros(count, np.bool_), np.zeros(count, np.int64))
     solve_group(sizes, group, motion, queue, held, work_of(sizes, group), found)
     return [_solved(one.window, k, found) for k, one in enumerate(asked)]
 

@@ -50,7 +50,7 @@ def _piece(what, sizes, numbers, held, x, u, place, work, change, out, settings,
     if what == LOOK:
         looking = room.y, wide2(work.nearest, w, _THREE), wide1(work.top, w)
         put_present(sizes, group, rows, 1.0)
-        put_rows(sizes, group, held, at, control, rows, 0.0, 0.0, looking, scratch)
+        put_rows(sizes, group, held, at, control, rows, 0.0, 0.0, 0.0, looking, scratch)
     elif what == GAPS:
         gaps(sizes, group, at, control, gap)
     elif what == NEWTON:

@@ -192,7 +192,7 @@ def in_lanes(asked, width=LANES):
 @pytest.mark.shows("parallel", "exact: the same bytes")
 @pytest.mark.usefixtures("small_windows")
 @pytest.mark.parametrize(
-    ("threads", "width", "waiting", "seed"), [(1, 1, 1, 0), (1, 3, 3, 1), (1, 4, 32, 2), (2, 4, 8, 3)]
+    ("threads", "width", "waiting", "seed"), [(1, 1, 1, 0), (1, 3, 3, 1), (1, 9, 32, 2), (2, 4, 8, 3)]
 )
 def test_the_same_bytes_in_any_group(monkeypatch, threads, width, waiting, seed):
     """In windows of a few steps, some of which fail."""
@@ -201,7 +201,7 @@ def test_the_same_bytes_in_any_group(monkeypatch, threads, width, waiting, seed)
     assert any(one.steps is None for one in alone)
     rng = np.random.default_rng(seed)
 
-    def shuffled(waiting):
+    def shuffled(waiting, most):
         order = rng.permutation(len(waiting)).tolist()
         kind = waiting[order[0]].kind
         return [at for at in order if waiting[at].kind == kind][: 1 if kind is None else width]

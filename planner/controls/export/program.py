@@ -60,6 +60,7 @@ LINUXCNC_SHARES = (0.6, 0.3, 0.1, 0.02)
 FINEST = 2e-4  # chords closer than this [mm] are held up by the rounding of coordinates: 0.1 um of them made it 10 % slower
 ROUND_MIN = 1e-3  # P below this [mm]: the model was up to 9 % too fast
 OWN_CHORDS = 0.02  # share of the tolerance for chords on arcs of the program, for LinuxCNC's model
+SHOWN = 4  # decimals of a predicted time [s]
 MARGIN = 0.02  # of the predicted time: its error, see above
 PATH_MODE = re.compile(rb"G\s*6\s*[14]", re.IGNORECASE)
 
@@ -140,13 +141,13 @@ class Candidates:
 
     def _replaced(self, *, planned: bool) -> Array:
         """(R,) the rows that are written as chords: all that can be, or those that have no words there."""
-        control, reading = self.control, self.source.program.reading
+        control, program = self.control, self.source.program
 
         def is_replaced(row: Row) -> bool:
             if row.radius:  # which the control would reckon with once more
                 return not control.cycles
             own = row.value("E") is not None  # an extruder's moves stay, where the control knows them
-            return (planned and row.motion <= 30 and not own) or not takes_move(row, control, reading)
+            return (planned and row.motion <= 30 and not own) or not takes_move(row, control, program)
 
         return np.array([row.plain and is_replaced(row) for row in self.source.rows], dtype=bool)
 
@@ -205,10 +206,10 @@ def candidates(job: Candidates) -> list[Candidate]:
 
 
 def best_first(job: Candidates, found: list[Candidate]) -> list[Candidate]:
-    """The candidates as they are tried: the fastest first; for LinuxCNC the first one of them, unless another
-    is faster by more than the model's error."""
+    """The candidates as they are tried: the fastest first, of equal ones the program's own, which is the last; for
+    LinuxCNC the first one of them, unless another is faster by more than the model's error."""
     if job.control.name != LINUXCNC:
-        return sorted(found, key=lambda one: one.time)
+        return sorted([found[-1], *found[:-1]], key=lambda one: round(one.time, SHOWN))
     fastest = min(found, key=lambda one: one.time)
     first = fastest if fastest.time < (1.0 - MARGIN) * found[0].time else found[0]
     return [first, *(one for one in found if one is not first)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -138,9 +139,33 @@ def export_command(
             text = f"a row every {periods * trajectory.dt * 1e3:g} ms, {shape} between them within {miss * 1e3:.2g} µm of the setpoints"
             if between != "cubic" and for_ not in STRAIGHT:
                 text += f'; the verdict is on interpolation = "{between}" between the setpoints'
+    faults = _faults_of(plan, read.metadata.get("run_id"))
+    _say_verdict(faults)
     assumed = read.metadata.get("assumptions")
     _say_assumed(assumed if isinstance(assumed, list) else ())
     say(f"{output}: {text}")
+    if faults:
+        raise typer.Exit(FAILED)
+
+
+def _faults_of(plan: Path, run: object) -> Sequence[str]:
+    """Why the motion of a run failed its verdict, as the summary beside it says; empty if it passed."""
+    from planner.report.replace import SUMMARY
+
+    try:
+        said = json.loads(((plan if os.path.isdir(plan) else plan.parent) / SUMMARY).read_bytes())
+        if said["run_id"] != run:
+            raise ValueError("of another run")
+        passed, faults = said["verdict"]["passed"], said["verdict"]["faults"]
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        say("note: no summary of this motion is beside it: 'planner verify' judges it", err=True)
+        return ()
+    return () if passed is True else [str(fault) for fault in faults] or ["see its summary"]
+
+
+def _say_verdict(faults: Sequence[str]) -> None:
+    if faults:
+        say(f"verdict FAILED, and these files hold that motion: {'; '.join(faults[:1])}")
 
 
 @contextmanager
@@ -199,6 +224,9 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
         saved = _saved(plan)
         allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
         made = write_program(new, saved, for_.value, allowed)
+    assert saved.verdict is not None
+    faults = saved.verdict.sentences if made.planned and not saved.verdict.passed else ()
+    _say_verdict(faults)
     _say_assumed(saved.program.assumptions)
     say(f"{output / made.file}: {made.sentence}")
     for text in made.assumptions:
@@ -209,6 +237,8 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
         say(f"  {seconds:10.4f} s predicted by a model of {for_.value}'s planner: {name}")
     if made.predicted:
         say(f"  {for_.value} {NO_JERK}")
+    if faults:
+        raise typer.Exit(FAILED)
 
 
 @guarded

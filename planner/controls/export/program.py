@@ -52,6 +52,7 @@ ROUNDING = 2.0 * 10.0**-chords.DECIMALS  # room that coordinates need [mm]
 LESS = 0.9  # of the tolerance: what a plan should take that leaves room for chords
 LITTLE = 0.05  # of the tolerance: room below this is worth a note
 AS_IT_IS = "program as it is"
+PLANNED = "planned path"
 OWN_PATH = "program's own path, in the control's words"
 # Of the room, for chords: wider ones are fewer lines, narrower ones turn less at each.
 SHARES = (1.0, 0.5, 0.25, 0.1)
@@ -136,7 +137,7 @@ class Candidates:
         line = chords.spliced(planned, own, self.source.program, parts)
         if chords.off_the_path(line, self.plan, parts) > self.tolerance:
             return []
-        name = f"planned path, chords within {within / MICROMETRE:.3g} µm"
+        name = f"{PLANNED}, chords within {within / MICROMETRE:.3g} µm"
         return [Candidate(name=name, line=line, replaced=replaced)]
 
     def _replaced(self, *, planned: bool) -> Array:
@@ -242,6 +243,7 @@ class Exported:
 
     file: str  # its name
     sentence: str  # what it holds
+    planned: bool  # whether it holds the planned path
     # predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with its own path
     # mode
     predicted: dict[str, float]
@@ -284,6 +286,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     return Exported(
         file=file,
         sentence=sentence,
+        planned=chosen.name.startswith(PLANNED),
         predicted={one.name: one.time for one in found if np.isfinite(one.time)},
         assumptions=(*assumptions(job.source, as_it_is=chosen.replaced is None), FIRST_RUN),
         notes=notes,

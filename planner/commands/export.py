@@ -132,7 +132,7 @@ def export_command(
                 within=within,
                 cycle=cycle,
                 joints=tuple(joints.split(",")) if joints else (),
-                power=laser_power(_saved(plan).program, trajectory) if power else None,
+                power=laser_power(plan_in(plan).program, trajectory) if power else None,
             )
             periods, miss = write_table(new, trajectory, table)
             shape = "straight moves" if for_ in STRAIGHT else "cubics"
@@ -202,7 +202,7 @@ def _say_assumed(assumptions: Sequence[object]) -> None:
         say(str(line))
 
 
-def _saved(plan: Path) -> Plan:
+def plan_in(plan: Path) -> Plan:
     """The plan of a directory. Raises InputError for a trajectory file, which has no program."""
     from planner.report.html.saved import saved_plan
 
@@ -221,7 +221,7 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
     from planner.controls.export.program import NO_JERK, write_program
 
     with _new_directory(output) as new:
-        saved = _saved(plan)
+        saved = plan_in(plan)
         allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
         made = write_program(new, saved, for_.value, allowed)
     assert saved.verdict is not None

@@ -139,12 +139,12 @@ def test_a_planned_path_that_failed_its_verdict_is_said_first(
     assert plan.verdict is not None
     said = SimpleNamespace(sentence="jerk.x: too much")
     failed = dataclasses.replace(plan.verdict, passed=False, faults=(said,))
-    monkeypatch.setattr(export, "_saved", lambda _: dataclasses.replace(plan, verdict=failed))
+    monkeypatch.setattr(export, "plan_in", lambda _: dataclasses.replace(plan, verdict=failed))
     options = "--for", "klipper", "--tolerance", str(TOLERANCE), "-o", tmp_path / "out"
     done = run("export", tmp_path, *options)
     assert done.exit_code == 1
     assert done.stdout.startswith("verdict FAILED, and these files hold that motion: jerk.x: too much")
-    monkeypatch.setattr(export, "_saved", lambda _: plan)
+    monkeypatch.setattr(export, "plan_in", lambda _: plan)
     assert run("export", tmp_path, *options[:-1], tmp_path / "again").exit_code == 0
 
 

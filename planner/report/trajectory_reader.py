@@ -25,7 +25,14 @@ from planner.base.files import require_ending
 from planner.base.units import RAD_PER_DEG
 from planner.machine import ALL_AXES, EXTRUDER, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
-from planner.report.trajectory_room import npz_shapes, on_grid, require_room, rounding
+from planner.report.trajectory_room import (
+    is_number,
+    npz_shapes,
+    on_grid,
+    require_names,
+    require_room,
+    rounding,
+)
 from planner.verifier import DERIVATIVES, Given
 
 Format = Literal["parquet", "csv", "npz"]
@@ -151,6 +158,7 @@ def _read_csv(path: Path) -> tuple[dict[str, Any], str]:
     from pyarrow import csv
 
     with open(path, "rb") as stream:
+        require_names(path, stream)
         table = csv.read_csv(stream)
     beside = path.with_suffix(CSV_METADATA)
     text = beside.read_text(encoding="utf-8") if beside.exists() else ""
@@ -190,6 +198,11 @@ def _known(name: str) -> bool:
 def _numbers(source: str, name: str, column: Any) -> Array:
     """A column as numbers. Raises InputError naming the column and the row of the first that is none."""
     column = np.asarray(column)
+    if column.ndim == 1 and column.dtype.kind in "OSU":  # a CSV file with a word in it
+        row, text = next(((k, text) for k, text in enumerate(column) if not is_number(text)), (0, "no row"))
+        raise InputError(
+            f"column '{name}', row {row + 1}: {str(text)[:20]!r}; a number is needed", source=source
+        )
     if column.ndim != 1 or column.dtype.kind not in "fiub":
         raise InputError(
             f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed", source=source

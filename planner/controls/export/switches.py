@@ -158,22 +158,27 @@ class Switches(Output):
         for code in row.m():
             name = f"M{code}"
             if code * 10 in ENDS:
-                self._end(name)
+                self._end(row, name)
             elif code in _STOPS:
                 text = self.machine.macros.get(name) or self.control.instead.get(name, name)
                 self._option(text, row)
                 self._flush_speed()
                 self._say(text)
 
-    def _end(self, said: str = "") -> None:
+    def _end(self, row: Row, said: str = "") -> None:
         """The end of the program, M2 and M30 where they are known; spindle and coolant do not outlive it."""
         self.ended = True
-        known = bool(said) and int(said[1:]) in self.control.m
+        macro = self.machine.macros.get(said, "")
+        known = not macro and bool(said) and int(said[1:]) in self.control.m
         for on, name in ((self.spindle, "M5"), (self.coolant, "M9")):
+            if not on or known or self.control.end == "M2":
+                continue
             text = self.machine.macros.get(name, name if int(name[1:]) in self.control.m else "")
-            if on and text and not known and self.control.end != "M2":
+            if text:
                 self._say(text)
-        self._say(said if known else self.control.end)
+            elif not macro:
+                self._refuse(row, f"{name}, as which {said or 'the end'} acts,")
+        self._say(macro or (said if known else self.control.end))
 
 
 def _with_own(row: Row, name: str, letters: str) -> str:

@@ -93,7 +93,7 @@ class Translator(Switches):
         for row, chords in zip(self.source.rows, self.replaced.tolist(), strict=True):
             self._row(row, chords=chords)
         if not self.ended:
-            self._end()
+            self._end(self.source.rows[-1])
         return self.lines, tuple(f"line {line}: {text}" for text, line in self.notes.values())
 
     def _row(self, row: Row, *, chords: bool) -> None:

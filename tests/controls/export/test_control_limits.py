@@ -118,6 +118,32 @@ def test_spindle_and_coolant_end_with_the_program(tmp_path: Path) -> None:
     assert lines_of(job_of(text + "M5\nM9\n", "marlin", tmp_path))[-3:] == ["M5", "M9", "M400"]
 
 
+@pytest.mark.parametrize(
+    ("macros", "end"),
+    [
+        ({"M5": "OFF", "M9": "DRY"}, ["OFF", "DRY", "M400"]),
+        ({"M5": "OFF", "M9": "DRY", "M30": "DONE"}, ["OFF", "DRY", "DONE"]),
+        ({"M5": "OFF", "M30": "DONE"}, ["G1 X10 F600", "OFF", "DONE"]),
+        ({"M5": "OFF"}, "M9, as which M30 acts,"),
+        ({"M9": "DRY"}, "M5, as which M30 acts,"),
+    ],
+)
+def test_what_is_on_at_the_end_is_switched_off_by_a_macro_or_refused(
+    macros: dict[str, str], end: list[str] | str
+) -> None:
+    """Klipper got an M5 that it does not know, the coolant stayed on, and a macro for M30 was not called."""
+    machine = planner.load_machine("mill").model_copy(update={"macros": {"M3": "M3", "M8": "WET", **macros}})
+    program = planner.read_program(text="G21 G90\nM3 S900\nM8\nG1 X10 F600\nM30\n", machine=machine)
+    made = planner.plan(program, machine, tolerance=0.04, method="kinematic")
+    job = Candidates(made, CONTROLS["klipper"], 0.05)
+    if isinstance(end, list):
+        assert lines_of(job)[-3:] == end
+    else:
+        with pytest.raises(planner.InputError, match=end) as fault:
+            lines_of(job)
+        assert fault.value.line == 5
+
+
 def test_of_equal_times_the_program_as_it_is_is_written(tmp_path: Path) -> None:
     job = job_of("G21 G90 G94\nG0 X1 Y2 Z3\nG1 X10 F600\nG4 P1\nG1 Y10\nM2\n", "grbl", tmp_path)
     found = candidates(job)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -131,16 +132,40 @@ def export_command(
                 within=within,
                 cycle=cycle,
                 joints=tuple(joints.split(",")) if joints else (),
-                power=laser_power(_saved(plan).program, trajectory) if power else None,
+                power=laser_power(plan_in(plan).program, trajectory) if power else None,
             )
             periods, miss = write_table(new, trajectory, table)
             shape = "straight moves" if for_ in STRAIGHT else "cubics"
             text = f"a row every {periods * trajectory.dt * 1e3:g} ms, {shape} between them within {miss * 1e3:.2g} µm of the setpoints"
             if between != "cubic" and for_ not in STRAIGHT:
                 text += f'; the verdict is on interpolation = "{between}" between the setpoints'
+    faults = _faults_of(plan, read.metadata.get("run_id"))
+    _say_verdict(faults)
     assumed = read.metadata.get("assumptions")
     _say_assumed(assumed if isinstance(assumed, list) else ())
     say(f"{output}: {text}")
+    if faults:
+        raise typer.Exit(FAILED)
+
+
+def _faults_of(plan: Path, run: object) -> Sequence[str]:
+    """Why the motion of a run failed its verdict, as the summary beside it says; empty if it passed."""
+    from planner.report.replace import SUMMARY
+
+    try:
+        said = json.loads(((plan if os.path.isdir(plan) else plan.parent) / SUMMARY).read_bytes())
+        if said["run_id"] != run:
+            raise ValueError("of another run")
+        passed, faults = said["verdict"]["passed"], said["verdict"]["faults"]
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        say("note: no summary of this motion is beside it: 'planner verify' judges it", err=True)
+        return ()
+    return () if passed is True else [str(fault) for fault in faults] or ["see its summary"]
+
+
+def _say_verdict(faults: Sequence[str]) -> None:
+    if faults:
+        say(f"verdict FAILED, and these files hold that motion: {'; '.join(faults[:1])}")
 
 
 @contextmanager
@@ -177,7 +202,7 @@ def _say_assumed(assumptions: Sequence[object]) -> None:
         say(str(line))
 
 
-def _saved(plan: Path) -> Plan:
+def plan_in(plan: Path) -> Plan:
     """The plan of a directory. Raises InputError for a trajectory file, which has no program."""
     from planner.report.html.saved import saved_plan
 
@@ -196,9 +221,12 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
     from planner.controls.export.program import NO_JERK, write_program
 
     with _new_directory(output) as new:
-        saved = _saved(plan)
+        saved = plan_in(plan)
         allowed = float(saved.toolpath.tolerance.min()) if tolerance is None else tolerance
         made = write_program(new, saved, for_.value, allowed)
+    assert saved.verdict is not None
+    faults = saved.verdict.sentences if made.planned and not saved.verdict.passed else ()
+    _say_verdict(faults)
     _say_assumed(saved.program.assumptions)
     say(f"{output / made.file}: {made.sentence}")
     for text in made.assumptions:
@@ -209,6 +237,8 @@ def _program(plan: Path, for_: For, output: Path, tolerance: float | None) -> No
         say(f"  {seconds:10.4f} s predicted by a model of {for_.value}'s planner: {name}")
     if made.predicted:
         say(f"  {for_.value} {NO_JERK}")
+    if faults:
+        raise typer.Exit(FAILED)
 
 
 @guarded

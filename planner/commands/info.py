@@ -2,7 +2,7 @@
 
 import functools
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,9 @@ from planner.commands import options
 from planner.commands.machine import machine_named
 from planner.commands.terminal import BAD_INPUT, guarded, say, say_json, show
 from planner.nc.reading import Reading
+
+if TYPE_CHECKING:
+    from planner.machine import Machine
 
 
 @guarded
@@ -49,7 +52,8 @@ def expand_command(
     *,
     reading: Reading,
 ) -> None:
-    """Write a program out: parameters, expressions, loops and calls become lines that every control reads."""
+    """Write a program out: parameters, expressions, loops and calls become plain lines; G codes, cycles and offsets
+    stay the program's."""
     if force and output is None:
         raise InputError("--force has no effect without a file to write; name one with -o FILE")
     from planner.nc.reader import load, source_name
@@ -59,6 +63,8 @@ def expand_command(
     data = load(job)
     found = flat_program(data, machine_named(machine), reading, source=source_name(job))
     text = data if found is None else readable(found[0]).encode()
+    if found is not None and (why := _unread(text, machine_named(machine))):
+        say(f"note: LinuxCNC would not read it: {why}", err=True)
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -69,3 +75,21 @@ def expand_command(
     else:
         assert found[1].expansion is not None
         say(f"{output}: {found[1].expansion.rows:,} lines executed, {len(found[1]):,} blocks")
+
+
+def _unread(text: bytes, machine: "Machine") -> str:
+    """Why LinuxCNC does not read an expanded program; "" if it does."""
+    from planner.controls.export.controls import CONTROLS
+    from planner.nc.lexer import split_words
+    from planner.nc.reader import parse_program
+    from planner.nc.reading import LINUXCNC
+
+    try:
+        parse_program(text, machine, Reading(dialect=LINUXCNC), source="")
+    except InputError as fault:
+        return f"line {fault.line}: {fault.message}"
+    words = split_words(text, block_delete=True)
+    for k, (letter, value) in enumerate(zip(words.letter.tolist(), words.value.tolist(), strict=True)):
+        if letter == ord("G") and round(value * 10) not in CONTROLS[LINUXCNC].g:
+            return f"line {words.line[words.row(k)]}: G{value:g} is none of its codes"
+    return ""

@@ -9,6 +9,7 @@ import typer
 from planner.base.errors import InputError
 from planner.commands.options import (
     DEFAULT_MACHINE,
+    ForceOption,
     MachineOption,
     control_option,
     length_option,
@@ -96,11 +97,13 @@ def import_file(
             help="a limit in mm and s, such as z.jerk=1e4; repeat it for more",
         ),
     ] = None,
+    force: ForceOption = False,
 ) -> None:
     """Make a machine file from the settings of a control, and say what they leave open."""
     from planner.controls.machine_import.convert import RAMP_TIME, import_machine
-    from planner.report.replace import write_new
+    from planner.report.replace import refuse_inputs, write_new
 
+    refuse_inputs([output], [settings])
     imported = import_machine(
         settings,
         control=control,
@@ -108,7 +111,7 @@ def import_file(
         tolerance=tolerance,
         given=_limits_given(set_ or []),
     )
-    write_new(output, imported.text.encode())
+    write_new(output, imported.text.encode(), force=force)
     for sentence in imported.assumed:
         say(f"note: {sentence}")
     say(f"{output} written; plan with: planner plan JOB -m {output}")
@@ -142,6 +145,7 @@ def fit_command(
         typer.Option("--write", metavar="DIR", help="write the test programs into a new directory"),
     ] = None,
     output: Annotated[Path | None, output_option("FILE", "machine file to write (.toml)")] = None,
+    force: ForceOption = False,
 ) -> None:
     """Find limits of axes from recorded traces; accelerations, the speed at corners and a factor from the times of five
     test programs, which --write makes."""
@@ -149,7 +153,7 @@ def fit_command(
     from planner.controls.timing.times import control_named, control_times
     from planner.controls.timing.traces import limits_of
     from planner.nc.reader import read_program
-    from planner.report.replace import write_new
+    from planner.report.replace import refuse_inputs, write_new
 
     if (write is None) == (not measured):
         raise InputError(
@@ -185,7 +189,8 @@ def fit_command(
     for text in said:
         say(text)
     if output is not None:
-        write_new(output, machine_text(limits, settings, said).encode())
+        refuse_inputs([output], [Path(file) for text in measured or [] for file in text.split("=")])
+        write_new(output, machine_text(limits, settings, said).encode(), force=force)
         say(f"{output} written")
 
 

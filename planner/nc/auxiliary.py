@@ -225,7 +225,10 @@ def dwell(state: State, table: BlockTable, block: Block, ignored: IgnoredWords, 
             block.value["P"], block.at["P"] = block.value.pop(letter), block.at[letter]
             ignored.used[letter] += 1
     seconds = block.value.get("P")
-    if seconds is not None and "S" in block.value and ignored.printer:
+    if "S" in block.value and ignored.printer and ignored.klipper:
+        seconds = (seconds or 0.0) * MILLISECOND
+        findings.assume("S of G4 does nothing in Klipper, which reads P alone", block.line)
+    elif seconds is not None and "S" in block.value and ignored.printer:
         seconds = block.value["S"]
         findings.assume("of S and P of G4 S counts, as Marlin has it", block.line)
     elif seconds is not None and ignored.printer:

@@ -134,8 +134,17 @@ def require_none(faults: Sequence[Fault], source: str) -> None:
 class IgnoredWords:
     """Assumptions so far in one program."""
 
-    def __init__(self, reading: Reading, axes: str = "", *, extruder: bool = False, at_tip: bool = False):
+    def __init__(
+        self,
+        reading: Reading,
+        axes: str = "",
+        *,
+        extruder: bool = False,
+        at_tip: bool = False,
+        klipper: bool = False,
+    ):
         self.reading = reading
+        self.klipper = klipper  # the machine's control is Klipper
         self.at_tip = at_tip  # the machine has kinematics: the switch of the tool centre point is read
         # E words are those of an extruder of the machine (extruder.py); nothing is said of them
         self.follows = extruder and reading.extruder != IGNORE

@@ -31,7 +31,7 @@ from planner.nc.moves import Block, WordFault
 from planner.nc.plain import run_plain
 from planner.nc.printer import OF_STATE
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
-from planner.nc.reading import ABSOLUTE, AS_USUAL, Reading
+from planner.nc.reading import ABSOLUTE, AS_USUAL, KLIPPER, Reading
 from planner.nc.set_limits import LimitsInForce, SavedStates
 from planner.nc.splines import SplineReader
 from planner.nc.state import REFUSED_MOTION, State, begins_in_inches, state_of
@@ -65,7 +65,9 @@ class Interpreter(Mover):
         state.strict, state.absolute_centre = reading.strict, reading.arc_centres == ABSOLUTE
         self.tool_point = ToolPointSwitch(machine)
         extruder, at_tip = machine is not None and EXTRUDER in machine.axes, self.tool_point.chain is not None
-        self.ignored = IgnoredWords(reading, state.others, extruder=extruder, at_tip=at_tip)
+        control = machine.control if machine is not None else None
+        klipper = control is not None and control.name == KLIPPER
+        self.ignored = IgnoredWords(reading, state.others, extruder=extruder, at_tip=at_tip, klipper=klipper)
         self.table = BlockTable(len(state.letters))
         self.table.keep_origin(state)
         self.findings = Findings(strict=reading.strict)

@@ -42,6 +42,7 @@ from planner.nc.reading import (
 from planner.nc.unreadable import refuse_models
 
 _WORDS = re.compile(r"\s*(N\d+\s*)?[GMTFS]\d+(\.\d)?(\s|$)")  # how a program begins, and hardly a file name
+_DELETED = re.compile(rb"^[ \t]*/[ \t\d]*[A-Z#%<\[$]", re.MULTILINE | re.IGNORECASE)
 _G20, _G70 = 20.0, 70.0
 
 
@@ -143,6 +144,14 @@ def execute(
     data, left = reading.kept(data, source)
     for line, what in left:
         findings.assume(f"{what} left out, as --ignore says", line)
+    for deleted in _DELETED.finditer(data) if reading.block_delete else ():
+        text, line = (
+            "begins with / and is left out, as with block delete on",
+            data.count(b"\n", 0, deleted.start()) + 1,
+        )
+        if reading.strict:
+            raise InputError(f"{text} (assumed without --strict)", source=source, line=line, column=1)
+        findings.assume(text, line)
     interpreter.archive = detect.programs_of(data)
     data = next((one.text() for name, one in interpreter.archive.items() if name.endswith("mpf")), data)
     called = rewritten(data, machine, reading, source)

@@ -42,6 +42,7 @@ FEED_MIN = 0.01  # the lowest feed that is written [mm/s]: no control moves slow
 SAME_FEED = 1e-6  # a feed within this share of the programmed one is that [-]: rounding of lengths and times
 G93, G94, G95 = 93, 94, 95
 _F, _G = ord("F"), ord("G")
+DWELL, _SECONDS = 4.0, frozenset(b"XU")
 _NUMBER = re.compile(NUMBER)
 STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
@@ -273,12 +274,15 @@ class _Flat:
         dwells = set(self._dwells.find(words)) if self.points else set()
         for row in range(len(first) - 1):
             line = []
-            for w in range(first[row], first[row + 1]):
+            mine = range(first[row], first[row + 1])
+            waits = any(letters[w] == _G and values[w] == DWELL for w in mine)
+            for w in mine:
                 if letters[w] not in _LEFT_OUT:
                     number = written(values[w])
                     is_length = self.points and letters[w] in LENGTHS and "." not in number
                     with_point = is_length or (w in dwells and values[w].is_integer())
-                    line.append(chr(letters[w]) + number + "." * with_point)
+                    seconds = waits and letters[w] in _SECONDS  # Fanuc's G4 X and U, which others have as P
+                    line.append(("P" if seconds else chr(letters[w])) + number + "." * with_point)
             if line:
                 self.lines.append(" ".join(line))
 

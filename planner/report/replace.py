@@ -184,13 +184,24 @@ def write_whole(path: Path, text: str) -> None:
 
 
 def write_new(file: Path, text: bytes, *, force: bool | None = None) -> None:
-    """Write a file that is not there yet. Raises InputError if it is there, or cannot be written.
+    """Write a file that is not there yet, the whole of it or nothing. Raises InputError if it is there, or cannot be
+    written.
 
     force : write over one that is there; None where the command has no such option
     """
     try:
+        if force and file.is_file():
+            with replacing_file(file) as new:
+                new.write_bytes(text)
+            return
         with file.open("wb" if force else "xb") as stream:
-            stream.write(text)
+            try:
+                stream.write(text)
+                stream.flush()
+            except OSError:
+                if file.is_file():  # and no device
+                    file.unlink()
+                raise
     except FileExistsError:
         remedy = "give another name" if force is None else "give another name or --force"
         raise InputError(f"exists already and is not overwritten; {remedy}", source=str(file)) from None

@@ -25,7 +25,14 @@ from planner.base.files import require_ending
 from planner.base.units import RAD_PER_DEG
 from planner.machine import ALL_AXES, EXTRUDER, ROTARY_AXES
 from planner.motion.trajectory import Trajectory
-from planner.report.trajectory_room import npz_shapes, on_grid, require_room, rounding
+from planner.report.trajectory_room import (
+    is_number,
+    npz_shapes,
+    on_grid,
+    require_names,
+    require_room,
+    rounding,
+)
 from planner.verifier import DERIVATIVES, Given
 
 Format = Literal["parquet", "csv", "npz"]
@@ -73,8 +80,8 @@ def trajectory_file(path: Path) -> Path:
 def read_trajectory(path: str | Path) -> TrajectoryFile:
     """Read a trajectory file, written by this package or by another program.
 
-    Required are `t` [s] and at least one column for an axis [mm]. Missing velocities, accelerations and jerks
-    are divided differences of the other columns, at rest before the first sample and after the last; a
+    Required are `t` [s] and at least one column for an axis [mm]. Velocities, accelerations and jerks are those of every
+    axis or of none; missing ones are divided differences of the other columns, at rest before the first sample and after the last; a
     missing `s` is the length of the polyline through the samples, a missing `feed` the speed on it, 0 at the
     ends of positions alone. Missing `line` and `block` are 0 and -1, "unknown".
 
@@ -151,6 +158,7 @@ def _read_csv(path: Path) -> tuple[dict[str, Any], str]:
     from pyarrow import csv
 
     with open(path, "rb") as stream:
+        require_names(path, stream)
         table = csv.read_csv(stream)
     beside = path.with_suffix(CSV_METADATA)
     text = beside.read_text(encoding="utf-8") if beside.exists() else ""
@@ -190,6 +198,11 @@ def _known(name: str) -> bool:
 def _numbers(source: str, name: str, column: Any) -> Array:
     """A column as numbers. Raises InputError naming the column and the row of the first that is none."""
     column = np.asarray(column)
+    if column.ndim == 1 and column.dtype.kind in "OSU":  # a CSV file with a word in it
+        row, text = next(((k, text) for k, text in enumerate(column) if not is_number(text)), (0, "no row"))
+        raise InputError(
+            f"column '{name}', row {row + 1}: {str(text)[:20]!r}; a number is needed", source=source
+        )
     if column.ndim != 1 or column.dtype.kind not in "fiub":
         raise InputError(
             f"column '{name}' holds {column.dtype} of shape {column.shape}; numbers are needed", source=source
@@ -222,7 +235,7 @@ def _assemble(
         raise InputError(f"the columns differ in length: {lengths}", source=source)
     t, time_rounding, end_rounding, notes = _times(source, columns["t"])
     inside = np.array([RAD_PER_DEG if axis in ROTARY_AXES else 1.0 for axis in axes])  # at a radius of 1 mm
-    levels, there = _levels(columns, axes, t)
+    levels, there = _levels(source, columns, axes, t)
     levels = [level * inside for level in levels]
     for order, word in enumerate(DERIVATIVES, start=1):
         if order not in there:
@@ -249,7 +262,7 @@ def _assemble(
     rest: dict[str, Any] = {name: columns[name] if name in columns else make() for name, make in fill.items()}
     rest |= zip(("position", *DERIVATIVES), levels, strict=True)
     dt = float(np.median(np.diff(t)))
-    trajectory = Trajectory(axes=axes, dt=dt, t=t, extruder=_extruder(columns, t), **rest)
+    trajectory = Trajectory(axes=axes, dt=dt, t=t, extruder=_extruder(source, columns, t), **rest)
     delivered = Given(
         columns=tuple(DERIVATIVES[order - 1] for order in there[1:]),
         position_rounding=tuple(rounding(columns[axis]) * inside[k] for k, axis in enumerate(axes)),
@@ -260,22 +273,30 @@ def _assemble(
     return trajectory, delivered, tuple(notes)
 
 
-def _extruder(columns: dict[str, Array], t: FloatArray) -> FloatArray:
+def _extruder(source: str, columns: dict[str, Array], t: FloatArray) -> FloatArray:
     """(T, 4) the columns of the extruder, what is missing as differences of its place; (0, 4) without one."""
     if EXTRUDER not in columns:
         return np.zeros((0, 4))
-    return np.concatenate(_levels(columns, (EXTRUDER,), t)[0], axis=1)
+    return np.concatenate(_levels(source, columns, (EXTRUDER,), t)[0], axis=1)
 
 
 def _levels(
-    columns: dict[str, Array], axes: tuple[str, ...], t: FloatArray
+    source: str, columns: dict[str, Array], axes: tuple[str, ...], t: FloatArray
 ) -> tuple[list[FloatArray], list[int]]:
     """(T, A) positions and their three derivatives, what is missing as differences of the last level that is
-    there; and the orders that are there."""
+    there; and the orders that are there. Raises InputError where only some of the axes have one: that column would not
+    be judged."""
     levels: list[FloatArray] = []
     there: list[int] = []
     for order, prefix in enumerate(PREFIXES):
-        if all(prefix + axis in columns for axis in axes):
+        lacking = [prefix + axis for axis in axes if prefix + axis not in columns]
+        if 0 < len(lacking) < len(axes):
+            given = ", ".join(prefix + axis for axis in axes if prefix + axis in columns)
+            what = f"give the {DERIVATIVES[order - 1]} of every axis, or of none"
+            raise InputError(
+                f"there is a column {given}, and none {', '.join(lacking)}; {what}", source=source
+            )
+        if not lacking:
             there.append(order)
             levels.append(np.stack([columns[prefix + axis] for axis in axes], axis=1).astype(np.float64))
         else:

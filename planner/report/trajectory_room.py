@@ -33,6 +33,8 @@ PACKED, SMALL = 200, 256 << 20
 METADATA_MAX = 16 << 20  # bytes; those of a plan have some thousands
 _MEMBERS_MAX = 1_000  # arrays in an archive
 _NUMBER = 8  # bytes
+# Of the line with the names of the columns: what is looked at [bytes], and what is shown of it.
+LINE_MAX, LINE_SHOWN = 1 << 16, 100
 
 
 def npz_shapes(stream: BinaryIO) -> dict[str, tuple[int, ...]]:
@@ -95,6 +97,26 @@ DECIMALS_MAX = 16  # of a period [s]
 NEGLIGIBLE = 1e-12  # [s] rounding of times that moves nothing: at 1 m/s it is 1e-9 mm
 SMALLEST, LARGEST = 1e-12, 1e12  # [mm, s] numbers that are looked at
 FLOAT64 = 4e-16  # relative rounding of a product, twice
+
+
+def is_number(text: object) -> bool:
+    """Whether a cell of a file holds a number."""
+    try:
+        float(str(text))
+    except ValueError:
+        return False
+    return True
+
+
+def require_names(path: Path, stream: BinaryIO) -> None:
+    """Raise InputError if the first line of a CSV file does not name its columns, each once; `stream` is at its begin before
+    and after."""
+    line = stream.readline(LINE_MAX)
+    stream.seek(0)
+    names = line.decode("utf-8-sig", "replace").strip().split(",")
+    if line.strip() and (len(names) > len(set(names)) or all(map(is_number, names))):
+        said = f"the first line is {', '.join(names)[:LINE_SHOWN]!r}; it has to name each column once, such as t,x,y,z"
+        raise InputError(said, source=str(path), line=1, column=1)
 
 
 def rounding(column: Array) -> float:

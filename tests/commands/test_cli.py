@@ -163,6 +163,29 @@ def test_files_that_do_not_end(job: Path, tmp_path: Path) -> None:
             assert said in result.stderr
 
 
+@pytest.mark.parametrize(
+    ("line", "note"),
+    [
+        ("G4 X1.5", ""),
+        ("G52 X10.", "line 4: G52 is none of its codes"),
+        ("G83 X5. Y0. Z-3. R1. Q1. P300 F100", "line 4: P0.3: P word without"),
+    ],
+)
+def test_what_an_expanded_program_keeps_of_another_control_is_said(
+    tmp_path: Path, line: str, note: str
+) -> None:
+    """Help promised lines that every control reads, and G4 X stayed, which is an error elsewhere."""
+    job = tmp_path / "job.nc"
+    job.write_text(
+        f"%\nO10\n#1=5.\nWHILE [#1 LT 5] DO1\nEND1\nG21 G90 G94 G98\nG0 X#1 Y0 Z5.\n{line}\nG80 G4 U2\nG4 P500\nM30\n%\n"
+    )
+    done = run("expand", job)
+    assert done.exit_code == 0
+    assert done.stdout.splitlines()[4:6] == ["G80 G4 P2.", "G4 P0.5"]
+    assert done.stdout.splitlines()[3].startswith("G4 P1.5" if not note else line[:3])
+    assert (f"note: LinuxCNC would not read it: {note}" in done.stderr) == bool(note)
+
+
 def test_expand(tmp_path: Path) -> None:
     job, out = tmp_path / "job.ngc", tmp_path / "flat.ngc"
     job.write_text("G21 F600\no1 sub\nG1 X[#1*2] Y[1/3]\no1 endsub\no1 call [4]\no1 call [5]\nM2\n")

@@ -45,6 +45,25 @@ ASSUMED = [
 ]
 
 
+@pytest.mark.parametrize(
+    ("text", "line", "times"),
+    [
+        ("G21 G0 X1\n/ Y5\nX2\n/2 G1 Y7 F100\n", 2, " (2 times)"),
+        ("G21 G0 X1\n  /X9\nX2\n", 2, ""),
+        ("G21 G0 X1\n/(only a comment)\n/\nX2\n", 0, ""),
+    ],
+)
+def test_lines_that_block_delete_leaves_out_are_said(text: str, line: int, times: str) -> None:
+    """The switch is the operator's: with it off they are run."""
+    program = parse_program(text, BARE)
+    said = f"line {line}: begins with / and is left out, as with block delete on{times}"
+    assert program.assumptions == ((said,) if line else ())
+    if line:
+        with pytest.raises(InputError, match="begins with /") as fault:
+            parse_program(text, BARE, STRICT)
+        assert (fault.value.line, fault.value.column) == (line, 1)
+
+
 @pytest.mark.parametrize(("text", "line", "column", "part", "told"), ASSUMED)
 def test_an_assumption_is_said_first_and_refused_by_strict_reading(
     text: str, line: int, column: int, part: str, told: str | None

@@ -7,6 +7,7 @@ import pytest
 from same_program import STRICT, machine
 
 from planner.base.errors import InputError
+from planner.machine import load_machine
 from planner.nc.program import Kind
 from planner.nc.reader import parse_program
 
@@ -169,6 +170,16 @@ def test_the_seconds_of_a_dwell_are_no_speed() -> None:
     assert not [event for event in program.events if event.text[0] == "S"]
     spoken = parse_program("G21 F600\nG1 X5\nG4 P2 S900\nG1 X10\n")
     assert [event.text for event in spoken.events] == ["S900"]
+
+
+def test_klipper_does_not_wait_for_the_seconds_of_a_dwell() -> None:
+    """toolhead.py, cmd_G4: P in ms, and nothing else."""
+    text = "G21\nG90\nM83\nG1 X10 F3000\nG4 S3\nG1 X20\nG4 S3 P500\nG1 X30\nG4 P250\n"
+    program = parse_program(text, load_machine("voron"))
+    assert program.dwell[program.kind == Kind.DWELL].tolist() == [0.5, 0.25]
+    assert any("S of G4 does nothing in Klipper" in said for said in program.assumptions)
+    other = parse_program(text, load_machine("ender3"))
+    assert other.dwell[other.kind == Kind.DWELL].tolist() == [3.0, 3.0, 0.25]
 
 
 def test_turns_of_an_arc_are_refused_which_firmwares_count_otherwise() -> None:

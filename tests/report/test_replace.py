@@ -16,7 +16,7 @@ import pytest
 
 from planner.base.errors import InputError
 from planner.report import replace
-from planner.report.replace import check_output, checksums, replacing, replacing_file
+from planner.report.replace import check_output, checksums, replacing, replacing_file, write_new
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="locks and signals of Linux")
 
@@ -289,3 +289,22 @@ def test_a_directory_that_cannot_be_made_is_told_before_planning() -> None:
 def test_a_check_leaves_nothing_behind(tmp_path: Path) -> None:
     check_output(tmp_path / "a" / "b", ())
     assert not list(tmp_path.iterdir())
+
+
+@linux_only
+@pytest.mark.parametrize("force", [False, True])
+def test_a_new_file_is_whole_or_not_there(force: bool, tmp_path: Path) -> None:
+    """A full disk left the first part of a machine file, and with --force nothing of the old one."""
+    import resource
+
+    file, before = tmp_path / "my.toml", b"old" if force else None
+    if before is not None:
+        file.write_bytes(before)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(InputError, match="cannot be written"):
+            write_new(file, b"x" * 300_000, force=force)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [one.read_bytes() for one in tmp_path.iterdir()] == [before] * force

@@ -134,11 +134,15 @@ def columns(**change: object) -> dict[str, object]:
         ({"t": None}, "column 't' is missing"),
         ({"x": None, "y": None}, "no column of an axis"),
         ({"x": np.array([0.0, np.nan, 1, 2, 3])}, "column 'x', row 2: nan"),
-        ({"vx": np.array([0.0, 1, 2, 3, np.inf])}, "column 'vx', row 5: inf"),
+        ({"vx": np.array([0.0, 1, 2, 3, np.inf]), "vy": np.zeros(5)}, "column 'vx', row 5: inf"),
         ({"x": np.array([0.0, 1, 2, 1e300, 4])}, "column 'x', row 4: 1e+300; every value must be between"),
         ({"x": np.zeros(4)}, "differ in length"),
         ({"x": np.zeros((5, 2))}, "column 'x' holds"),
-        ({"x": np.array(list("abcde"))}, "column 'x' holds"),
+        ({"x": np.array(list("1a345"))}, "column 'x', row 2: 'a'; a number is needed"),
+        (
+            {"vx": np.arange(5.0)},
+            "there is a column vx, and none vy; give the velocity of every axis, or of none",
+        ),
         ({"t": np.array([0.0, 1, 1, 2, 3])}, "column 't', row 3"),
         ({"t": np.array([0.0, 1, 0.5, 2, 3])}, "column 't', row 3"),
     ],
@@ -246,3 +250,21 @@ def test_what_is_delivered_is_known(tmp_path: Path) -> None:
     assert given.columns == ("velocity", "acceleration", "jerk")
     assert not given.position_rounding.any()
     assert given.time_rounding == given.end_rounding == 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("0,0,0\n0.001,0,0\n", "1:1: the first line is '0, 0, 0'; it has to name each column once"),
+        ("t,x,y,x\n0,0,0,0\n", "1:1: the first line is 't, x, y, x'"),
+        ("t,x,y\n0,0,0\n0.001,a,0\n", "column 'x', row 2: 'a'; a number is needed"),
+        ("t,x,y\n", "column 't', row 1: 'no row'; a number is needed"),
+    ],
+)
+def test_a_table_without_names_or_with_words_is_told_where(tmp_path: Path, text: str, said: str) -> None:
+    """What pyarrow says of them, 'Field "0.0" exists 4 times in schema', helps nobody."""
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as fault:
+        read_trajectory(path)
+    assert said in str(fault.value)

@@ -56,8 +56,10 @@ def planned_polyline(plan: Plan, within: float, breaks: Array) -> Polyline:
     """
     trajectory = plan.require().trajectory
     assert trajectory is not None
-    rows, miss = _vertices(trajectory, _fixed(plan, trajectory, breaks), within)
-    points = _rounded(trajectory.position[rows])
+    position, moved = _switched(plan.program, trajectory, breaks, within)
+    rows, miss = _vertices(trajectory, position, _fixed(plan, trajectory, breaks), within - moved)
+    miss += moved
+    points = _rounded(position[rows])
     feed = np.maximum(np.maximum.reduceat(trajectory.feed, rows[:-1]), trajectory.feed[rows[1:]])
     block = trajectory.block[np.minimum(rows[:-1] + 1, rows[1:])]
     moves = (np.diff(points, axis=0) != 0).any(axis=1)
@@ -165,6 +167,30 @@ def _rounded(points: FloatArray) -> FloatArray:
     return found
 
 
+def _switched(
+    program: Program, trajectory: Trajectory, breaks: Array, within: float
+) -> tuple[FloatArray, float]:
+    """(T, A) setpoints, of which the last before each of the breaks goes on to where its block ends, on the way to
+    the next: what is switched there was switched up to a period early. And by how much chords through these miss the
+    setpoints that went on, at most half of `within` [mm]; where that would be more they stay."""
+    position = trajectory.position
+    last = np.searchsorted(trajectory.block, breaks, side="left") - 1
+    inside = (last > 0) & (last < len(position) - 1) & (breaks > 0)
+    last, ends = last[inside], program.end[breaks[inside] - 1]
+    before, here, step = position[last - 1], position[last], position[last + 1] - position[last]
+    size = (step * step).sum(axis=1)
+    u = np.divide(((ends - here) * step).sum(axis=1), size, out=np.zeros(len(size)), where=size > 0.0)
+    there = here + np.clip(u, 0.0, 1.0)[:, None] * step
+    chord = there - before
+    size = (chord * chord).sum(axis=1)
+    u = np.divide(((here - before) * chord).sum(axis=1), size, out=np.zeros(len(size)), where=size > 0.0)
+    off = np.linalg.norm(here - before - np.clip(u, 0.0, 1.0)[:, None] * chord, axis=1)
+    good = off <= 0.5 * within
+    moved = position.copy()
+    moved[last[good]] = there[good]
+    return moved, float(off[good].max(initial=0.0))
+
+
 def _fixed(plan: Plan, trajectory: Trajectory, breaks: Array) -> Array:
     """(T,) setpoints that are vertices: ends, standstills, those beside turning back, where rapid moves begin
     and end, and the last before each of the breaks."""
@@ -194,16 +220,18 @@ def _density(trajectory: Trajectory, within: float) -> FloatArray:
     return density
 
 
-def _vertices(trajectory: Trajectory, fixed: Array, within: float) -> tuple[Array, float]:
-    """(n+1,) the setpoints between which chords miss no other by more than `within` [mm], and by how much at most; those
-    that are `fixed` (T,) are among them."""
+def _vertices(
+    trajectory: Trajectory, position: FloatArray, fixed: Array, within: float
+) -> tuple[Array, float]:
+    """(n+1,) the setpoints, at places (T, A), between which chords miss no other by more than `within` [mm], and by how much
+    at most; those that are `fixed` (T,) are among them."""
     density = DENSER * _density(trajectory, within)
     along = np.append(0.0, np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(trajectory.s)))
     rows = np.flatnonzero(np.append(True, np.diff(np.floor(along)) > 0) | fixed)
     found, miss = [rows], 0.0
     begin, end = rows[:-1], rows[1:]
     while len(begin):
-        off = _misses(trajectory.position, begin, end)
+        off = _misses(position, begin, end)
         divided = (off > within) & (end - begin > 1)
         miss = max(miss, float(off[~divided].max(initial=0.0)))
         begin, end, off = begin[divided], end[divided], off[divided]

@@ -8,12 +8,17 @@ Marlin    2.1: marlinfw.org/meta/gcode, src/gcode/gcode.cpp, parser.cpp, queue.c
 LinuxCNC  2.9: docs/src/gcode/g-code.adoc, m-code.adoc, overview.adoc
 """
 
+import math
 import re
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from planner.base.units import MM_PER_INCH
 from planner.controls.export.rows import G10, G92, RETRACTIONS, Row, Word
 from planner.nc import codes
-from planner.nc.reading import ABSOLUTE, Reading
+from planner.nc.program import Program
+from planner.nc.reading import ABSOLUTE
 from planner.nc.settings import EVERYTHING
 
 _STAYS = "this control always stays on the path"
@@ -47,7 +52,12 @@ class Control:
     number: bool = True  # lines may begin with N
     percent: bool = False  # they may hold %
     paren: bool = True  # and comments in parentheses
-    line_max: int = 0  # longest line without blanks and comments; 0 for no limit
+    line_max: int = 0  # longest line [bytes]; 0 for no limit
+    whole_line: bool = False  # blanks and comments count in it
+    tool_max: float = math.inf  # highest number of a tool
+    systems: int = 9  # work offsets from G54 on
+    # pattern of characters that it obeys as they come in, in comments too
+    at_once: str = r"(?!)"
     end: str = "M2"  # the last line of a program that has none, or whose M2 or M30 it does not know
 
     @property
@@ -90,6 +100,9 @@ GRBL = Control(
     instead={"M6": "M0", "M60": "M0"},
     letters="FIJKLNPRSTXYZ",
     line_max=79,  # LINE_BUFFER_SIZE 80 with its end
+    tool_max=255.0,
+    systems=6,
+    at_once=r"[!~\x18\x80-\xff]",  # feed hold, cycle start, reset, safety door, overrides: serial.c
 )  # fmt: skip
 KLIPPER = Control(
     name="klipper",
@@ -135,7 +148,8 @@ LINUXCNC = Control(
     settings=frozenset(range(100, 200)),
     letters="ABCDEFHIJKLPQRSTUVWXYZ",
     percent=True,
-    line_max=255,
+    line_max=253,  # LINELEN 255 with its end
+    whole_line=True,
 )
 
 
@@ -151,22 +165,45 @@ def is_setting(words: list[Word], control: Control) -> bool:
 
 
 def sets_tools(row: Row) -> bool:
-    """Whether G10 sets more than an origin (L1, L10, L11; R), or G43.1 more than a length in Z: grbl knows neither."""
-    kind, g = row.value("L"), row.g()
+    """Whether G10 sets more than an origin up to G59 (L1, L10, L11; R; P7), or G43.1 more than a length in Z: grbl knows neither."""
+    kind, g, system = row.value("L"), row.g(), row.value("P")
     more = kind is None or kind.value not in (2.0, 20.0) or row.value("R") is not None
+    more |= system is not None and system.value > GRBL.systems
     return (G10 in g and more) or (431 in g and (row.value("X") or row.value("Y")) is not None)
 
 
-def takes_move(row: Row, control: Control, reading: Reading) -> bool:
+def takes_move(row: Row, control: Control, program: Program) -> bool:
     """Whether the control is given a move in the program's own words."""
     if row.radius and not control.cycles:
         return False
     if row.motion in codes.ARCS:  # none with turns for grbl, none with absolute centres for any
-        known = control.arcs and reading.arc_centres != ABSOLUTE
-        return known and (control.cycles or row.value("P") is None)
+        known = control.arcs and program.reading.arc_centres != ABSOLUTE
+        return known and (control.cycles or (row.value("P") is None and _is_arc_of_grbl(row, program)))
     return row.motion <= 30 or (control.cycles and row.motion in control.g)
 
 
+def _is_arc_of_grbl(row: Row, program: Program) -> bool:
+    """Whether an arc passes the checks of grbl's gcode.c: it has a coordinate in its plane, the radii at its ends agree,
+    and R reaches both, by more than what grbl's single precision rounds."""
+    plane = ["XYZ".index(axis) for axis in row.plane]
+    if frozenset(row.named).isdisjoint(row.plane):
+        return False
+    arcs = np.searchsorted(program.arc_block, [row.first, row.last])
+    for block, centre in zip(program.arc_block[slice(*arcs)], program.arc_center[slice(*arcs)], strict=True):
+        start, end = (program.end[block - 1] if block else program.start)[plane], program.end[block, plane]
+        if (radius := row.value("R")) is not None:
+            reach = 2.0 * abs(radius.value) * (MM_PER_INCH if row.inch else 1.0)
+            return bool(reach > np.linalg.norm(end - start) + _R_ROUNDING)
+        first, last = (float(np.linalg.norm(place - centre[plane])) for place in (start, end))
+        apart = abs(first - last)
+        if apart > _RADII_APART and apart > min(_RADII_APART_MAX, _RADII_SHARE * first):
+            return False
+    return True
+
+
+# How far the radii at the ends of an arc may be apart on grbl: [mm], or up to so much [mm] the share.
+_RADII_APART, _RADII_APART_MAX, _RADII_SHARE = 0.004, 0.4, 0.9e-3  # of its 0.005, 0.5 and 0.001
+_R_ROUNDING = 1e-3  # [mm], of 2 R: single precision at 1 m is 6e-5
 CONTROLS = {control.name: control for control in (GRBL, KLIPPER, MARLIN, LINUXCNC)}
 # What is said of codes that need a control built with an option.
 OPTIONS = {

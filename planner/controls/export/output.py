@@ -125,7 +125,10 @@ class Output:
 def comment(text: str, control: Control) -> str:
     """A comment of a control, in ASCII."""
     text = text.replace("µ", "u")
-    clean = "".join(c if c.isascii() and c.isprintable() and c not in "()" else "_" for c in text)
+    obeyed = re.compile(control.at_once)
+    clean = "".join(
+        c if c.isascii() and c.isprintable() and c not in "()" and not obeyed.match(c) else "_" for c in text
+    )
     return f"({clean})" if control.paren else f"; {clean}"
 
 

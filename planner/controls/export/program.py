@@ -52,6 +52,7 @@ ROUNDING = 2.0 * 10.0**-chords.DECIMALS  # room that coordinates need [mm]
 LESS = 0.9  # of the tolerance: what a plan should take that leaves room for chords
 LITTLE = 0.05  # of the tolerance: room below this is worth a note
 AS_IT_IS = "program as it is"
+PLANNED = "planned path"
 OWN_PATH = "program's own path, in the control's words"
 # Of the room, for chords: wider ones are fewer lines, narrower ones turn less at each.
 SHARES = (1.0, 0.5, 0.25, 0.1)
@@ -60,6 +61,7 @@ LINUXCNC_SHARES = (0.6, 0.3, 0.1, 0.02)
 FINEST = 2e-4  # chords closer than this [mm] are held up by the rounding of coordinates: 0.1 um of them made it 10 % slower
 ROUND_MIN = 1e-3  # P below this [mm]: the model was up to 9 % too fast
 OWN_CHORDS = 0.02  # share of the tolerance for chords on arcs of the program, for LinuxCNC's model
+SHOWN = 4  # decimals of a predicted time [s]
 MARGIN = 0.02  # of the predicted time: its error, see above
 PATH_MODE = re.compile(rb"G\s*6\s*[14]", re.IGNORECASE)
 
@@ -135,18 +137,18 @@ class Candidates:
         line = chords.spliced(planned, own, self.source.program, parts)
         if chords.off_the_path(line, self.plan, parts) > self.tolerance:
             return []
-        name = f"planned path, chords within {within / MICROMETRE:.3g} µm"
+        name = f"{PLANNED}, chords within {within / MICROMETRE:.3g} µm"
         return [Candidate(name=name, line=line, replaced=replaced)]
 
     def _replaced(self, *, planned: bool) -> Array:
         """(R,) the rows that are written as chords: all that can be, or those that have no words there."""
-        control, reading = self.control, self.source.program.reading
+        control, program = self.control, self.source.program
 
         def is_replaced(row: Row) -> bool:
             if row.radius:  # which the control would reckon with once more
                 return not control.cycles
             own = row.value("E") is not None  # an extruder's moves stay, where the control knows them
-            return (planned and row.motion <= 30 and not own) or not takes_move(row, control, reading)
+            return (planned and row.motion <= 30 and not own) or not takes_move(row, control, program)
 
         return np.array([row.plain and is_replaced(row) for row in self.source.rows], dtype=bool)
 
@@ -205,10 +207,10 @@ def candidates(job: Candidates) -> list[Candidate]:
 
 
 def best_first(job: Candidates, found: list[Candidate]) -> list[Candidate]:
-    """The candidates as they are tried: the fastest first; for LinuxCNC the first one of them, unless another
-    is faster by more than the model's error."""
+    """The candidates as they are tried: the fastest first, of equal ones the program's own, which is the last; for
+    LinuxCNC the first one of them, unless another is faster by more than the model's error."""
     if job.control.name != LINUXCNC:
-        return sorted(found, key=lambda one: one.time)
+        return sorted([found[-1], *found[:-1]], key=lambda one: round(one.time, SHOWN))
     fastest = min(found, key=lambda one: one.time)
     first = fastest if fastest.time < (1.0 - MARGIN) * found[0].time else found[0]
     return [first, *(one for one in found if one is not first)]
@@ -241,6 +243,7 @@ class Exported:
 
     file: str  # its name
     sentence: str  # what it holds
+    planned: bool  # whether it holds the planned path
     # predicted times by candidate [s]; empty for a program that LinuxCNC gets as it is, with its own path
     # mode
     predicted: dict[str, float]
@@ -283,6 +286,7 @@ def write_program(directory: Path, plan: Plan, control: str, tolerance: float) -
     return Exported(
         file=file,
         sentence=sentence,
+        planned=chosen.name.startswith(PLANNED),
         predicted={one.name: one.time for one in found if np.isfinite(one.time)},
         assumptions=(*assumptions(job.source, as_it_is=chosen.replaced is None), FIRST_RUN),
         notes=notes,

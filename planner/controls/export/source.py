@@ -8,8 +8,8 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
 from planner.controls.export.chords import DECIMALS
-from planner.controls.export.controls import Control, is_setting, sets_tools, takes_move
-from planner.controls.export.rows import G4, G10, G92, HOMES, Row, Source, rows_of
+from planner.controls.export.controls import GRBL, Control, is_setting, sets_tools, takes_move
+from planner.controls.export.rows import ENDS, G4, G10, G92, HOMES, Row, Source, rows_of
 from planner.machine import Machine
 from planner.nc import codes
 from planner.nc.language.detect import without_leader
@@ -111,6 +111,13 @@ _OWN = {
     "G4": "P",
     "G92": "XYZE",
 }
+# What the reader takes and controls do not: a byte order mark, no-break spaces, NUL, the end of a file of DOS, lines that end
+# with a carriage return alone.
+_FOREIGN = re.compile(rb"\xef\xbb\xbf|\xc2\xa0|[\0\x1a]|\r[^\r\n]")
+_LONG_NUMBER = re.compile(
+    rb"^[ \t]*N[ \t]*\d{8}", re.MULTILINE | re.IGNORECASE
+)  # grbl has them up to 10,000,000
+_ASIDE = re.compile(rb"\([^)\n]*\)|;[^\n]*|[ \t\r]+")
 _PAREN = re.compile(rb"^[^;\n]*\(", re.MULTILINE)
 _SLASH = re.compile(rb"^\s*/", re.MULTILINE)
 _NUMBER = re.compile(rb"^\s*N\s*\d", re.MULTILINE | re.IGNORECASE)
@@ -130,6 +137,20 @@ def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> 
         (program.reading.lines or program.reading.names, "lines or words were left out by --ignore"),
         (without_leader(text, program.reading)[1], "there is text before the first %"),
         (not control.number and _NUMBER.search(text), "its lines have numbers"),
+        (control.name == GRBL.name and _LONG_NUMBER.search(text), "its lines have numbers of eight digits"),
+        (
+            _FOREIGN.search(text),
+            "it has a byte order mark, no-break spaces, NUL bytes, or lines that end with CR alone",
+        ),
+        (
+            re.search(control.at_once.encode("latin-1"), text),
+            "it has characters that this control obeys at once, in comments too: ! ~ and those beyond ASCII",
+        ),
+        (
+            _longest(text, control) > control.line_max > 0,
+            f"it has lines of more than {control.line_max} characters",
+        ),
+        (linuxcnc and not _has_end(source.rows), "it does not end with M2, M30 or %"),
     ):
         if holds:
             return why
@@ -144,6 +165,19 @@ def why_not(source: Source, text: bytes, control: Control, machine: Machine) -> 
         if why:
             return f"line {row.line}: {why}"
     return ""
+
+
+def _longest(text: bytes, control: Control) -> int:
+    """The length of its longest line, as the control counts them [bytes]."""
+    return max(map(len, (text if control.whole_line else _ASIDE.sub(b"", text)).split(b"\n")))
+
+
+def _has_end(rows: list[Row]) -> bool:
+    """Whether M2 or M30 ends the rows, or the second of two percent signs."""
+    percent = [bool(row.others) and row.others[0][0].letter == "%" for row in (*rows[:1], *rows[-1:])]
+    return any(not ENDS.isdisjoint(w.code for w in row.words if w.letter == "M") for row in rows[-1:]) or (
+        len(rows) > 1 and all(percent)
+    )
 
 
 def _row_why_not(row: Row, source: Source, control: Control) -> str:
@@ -187,14 +221,14 @@ def _line_why_not(row: Row) -> str:
 
 
 def _grbl_why_not(row: Row, source: Source, control: Control) -> str:
-    if row.motion in codes.ARCS and not takes_move(row, control, source.program.reading):
-        return "an arc with P, or with absolute centres"
+    if row.motion in codes.ARCS and not takes_move(row, control, source.program):
+        return "an arc with P or absolute centres, without a coordinate in its plane, or off its radius"
     if sets_tools(row):
         return "G10 or G43.1 with more than grbl's"
     if row.inch != row.inch_before and row.value("F") is not None:
         return "F beside G20 or G21, which grbl reads in the new units"
-    length = sum(len(word.text) + 1 for word in row.words)
-    return f"longer than {control.line_max} characters" if length > control.line_max else ""
+    tool = row.value("T")
+    return f"{tool} is above T{control.tool_max:g}" if tool and tool.value > control.tool_max else ""
 
 
 def _rs274_why_not(row: Row, source: Source) -> str:

@@ -9,6 +9,7 @@ from planner.nc import codes
 from planner.nc.program import plain
 
 _SPINDLE, _SPINDLE_OFF = (3, 4), 5
+_COOLANT, _COOLANT_OFF = (7, 8), 9
 _STOPS = (0, 1, 60)
 _G96, _G80 = 960, 800
 
@@ -18,6 +19,7 @@ class Switches(Output):
 
     tool = ""  # the last T word
     ended = False  # by M2 or M30
+    coolant = False  # on
 
     def _other(self, row: Row, words: list[Word]) -> None:
         """A code that is none of RS274NGC's moves and modes."""
@@ -43,7 +45,10 @@ class Switches(Output):
         tool, macros = row.value("T"), self.machine.macros
         if tool is not None:
             self.tool = str(tool)
-            if "T" in self.control.letters:
+            if tool.value > self.control.tool_max:
+                highest = f"the control counts to T{self.control.tool_max:g}"
+                self._note("T", f"{self.tool} is left out: {highest}", row)
+            elif "T" in self.control.letters:
                 changes = 6 in row.m() and 6 in self.control.m and "M6" not in macros
                 self._say(f"{self.tool} M6" if changes else self.tool)
             elif 6 not in row.m():
@@ -53,6 +58,7 @@ class Switches(Output):
             macro = macros.get(name)
             if code * 10 in ENDS or code in _STOPS:
                 continue
+            self.coolant = code != _COOLANT_OFF and (self.coolant or code in _COOLANT)
             if code in (*_SPINDLE, _SPINDLE_OFF):
                 self._turn(row, code, macro)
             elif code == 6:
@@ -62,7 +68,7 @@ class Switches(Output):
             elif code in self.control.m:
                 self._option(name, row)
                 self._say(_with_own(row, name, codes.WORDS.get(("M", code * 10), "")))
-            elif code == 9 and name not in self.control.idle and not {"M7", "M8"} & macros.keys():
+            elif code == _COOLANT_OFF and name not in self.control.idle and not {"M7", "M8"} & macros.keys():
                 self._note(name, "M9 is left out: nothing has switched a coolant on", row)
             else:
                 self._idle(row, name)
@@ -152,20 +158,27 @@ class Switches(Output):
         for code in row.m():
             name = f"M{code}"
             if code * 10 in ENDS:
-                self._end(name)
+                self._end(row, name)
             elif code in _STOPS:
                 text = self.machine.macros.get(name) or self.control.instead.get(name, name)
                 self._option(text, row)
                 self._flush_speed()
                 self._say(text)
 
-    def _end(self, said: str = "") -> None:
-        """The end of the program, M2 and M30 where they are known; the spindle does not outlive it."""
+    def _end(self, row: Row, said: str = "") -> None:
+        """The end of the program, M2 and M30 where they are known; spindle and coolant do not outlive it."""
         self.ended = True
-        known = bool(said) and int(said[1:]) in self.control.m
-        if self.spindle and not known and said:
-            self._say(self.machine.macros.get("M5", "M5"))
-        self._say(said if known else self.control.end)
+        macro = self.machine.macros.get(said, "")
+        known = not macro and bool(said) and int(said[1:]) in self.control.m
+        for on, name in ((self.spindle, "M5"), (self.coolant, "M9")):
+            if not on or known or self.control.end == "M2":
+                continue
+            text = self.machine.macros.get(name, name if int(name[1:]) in self.control.m else "")
+            if text:
+                self._say(text)
+            elif not macro:
+                self._refuse(row, f"{name}, as which {said or 'the end'} acts,")
+        self._say(macro or (said if known else self.control.end))
 
 
 def _with_own(row: Row, name: str, letters: str) -> str:

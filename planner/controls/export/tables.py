@@ -165,8 +165,8 @@ def longest_interval(
     trajectory: Trajectory, within: FloatArray, *, straight: bool = False
 ) -> tuple[int, float]:
     """Interpolation periods between two rows, at most `PERIODS_MAX`, and by how much the motion between them
-    misses the setpoints at most [mm, rad]: on straight moves or cubics, `within` (A,) of them on each
-    axis."""
+    misses the setpoints at most [mm]: on straight moves or cubics, `within` (A,) of them, on the linear axes together
+    and on each rotary axis."""
     found, miss = 1, 0.0
     while (periods := 2 * found) <= min(PERIODS_MAX, max(len(trajectory) - 1, 1)):
         off = _miss(trajectory, _rows(len(trajectory), periods), straight=straight)
@@ -183,7 +183,8 @@ def _rows(samples: int, periods: int) -> Array:
 
 
 def _miss(trajectory: Trajectory, rows: Array, *, straight: bool) -> FloatArray:
-    """(A,) largest distance of the motion between the rows from the setpoints."""
+    """(A,) largest distance of the motion between the rows from the setpoints: of the linear axes together, the same for each,
+    and of each rotary axis."""
     t, p, v = trajectory.t, trajectory.position, trajectory.velocity
     k = np.clip(np.searchsorted(rows, np.arange(len(t)), side="right") - 1, 0, max(len(rows) - 2, 0))
     a, b = rows[k], rows[np.minimum(k + 1, len(rows) - 1)]
@@ -195,6 +196,8 @@ def _miss(trajectory: Trajectory, rows: Array, *, straight: bool) -> FloatArray:
         between = (1 + 2 * u) * (1 - u) ** 2 * p[a] + u * (1 - u) ** 2 * h * v[a]
         between += u**2 * (3 - 2 * u) * p[b] - u**2 * (1 - u) * h * v[b]
     off: FloatArray = np.abs(between - p).max(axis=0)
+    linear = [k for k, axis in enumerate(trajectory.axes) if axis not in ROTARY_AXES]
+    off[linear] = np.linalg.norm((between - p)[:, linear], axis=1).max()
     return off
 
 

@@ -93,7 +93,7 @@ class Translator(Switches):
         for row, chords in zip(self.source.rows, self.replaced.tolist(), strict=True):
             self._row(row, chords=chords)
         if not self.ended:
-            self._end()
+            self._end(self.source.rows[-1])
         return self.lines, tuple(f"line {line}: {text}" for text, line in self.notes.values())
 
     def _row(self, row: Row, *, chords: bool) -> None:
@@ -131,7 +131,7 @@ class Translator(Switches):
         """A line of its own that moves, or whose coordinates shift others, word for word."""
         one_shot = _one_shot(row)
         if self.control.name == GRBL.name and sets_tools(row):
-            self._refuse(row, "G10 or G43.1 with more than an origin, or a length in Z")
+            self._refuse(row, "G10 or G43.1 with more than an origin up to G59, or a length in Z")
         if not LENGTHS.isdisjoint(row.g()):
             return  # the coordinates are those of the tool length
         if one_shot == G10 and self.program.reading.dialect == FANUC:
@@ -172,7 +172,7 @@ class Translator(Switches):
         if row.motion < 0:
             self._refuse(row, "coordinates without a motion code")
         code = f"G{codes.number(row.motion)}"
-        if not takes_move(row, self.control, self.program.reading):
+        if not takes_move(row, self.control, self.program):
             if row.motion in codes.SPLINES and not row.moves:
                 return None, False  # a further line of a spline that is written as straight moves
             what = code if not row.radius else f"{code} under cutter radius compensation"
@@ -188,8 +188,13 @@ class Translator(Switches):
             return "its feed is not per minute"
         if self.extrudes and not row.absolute:
             return "it is under G91, where E is a step; write it under G90"
-        away = " and ".join(c for c in "XYZ" if c not in row.placed)
-        return f"the program does not say where {away} are before it" if away else "it is no plain move"
+        away = [c for c in "XYZ" if c not in row.placed]
+        verb = "are" if len(away) > 1 else "is"
+        return (
+            f"the program does not say where {' and '.join(away)} {verb} before it"
+            if away
+            else "it is no plain move"
+        )
 
     def _used(self, row: Row) -> set[str]:
         """Letters of a row that belong to its move: not those of its modes."""

@@ -14,6 +14,7 @@ Klipper: klippy/configfile.py):
                where the rest says nothing
 """
 
+import codecs
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -165,10 +166,14 @@ def _files(name: str, source: str) -> list[Path]:
 
 
 def read_settings(path: Path, said: str = "") -> str:
-    """The text of a file of settings. Raises InputError if there is none."""
+    """The text of a file of settings, UTF-16 too, as Windows' shell saves what a control prints. Raises InputError if
+    there is none."""
     try:
         require_ending(path)
-        return path.read_text(encoding="utf-8", errors="replace")
+        data = path.read_bytes()
+        is_utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        text = data.decode("utf-16" if is_utf16 else "utf-8-sig", "replace")
+        return text.replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, ValueError) as fault:
         if isinstance(fault, InputError):
             raise

@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import planner
+from planner.commands import export
 from planner.controls.export.chords import planned_polyline, programmed_polyline
 from planner.controls.export.controls import CONTROLS
 from planner.controls.export.program import OWN_PATH, Candidates, write_program
@@ -129,6 +131,21 @@ def test_a_plan_that_leaves_no_room_gives_the_program_as_it_is_and_says_so(
     with pytest.raises(planner.InputError, match="leaves the program"):
         write_program(tmp_path, lost, "grbl", TOLERANCE)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_planned_path_that_failed_its_verdict_is_said_first(
+    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert plan.verdict is not None
+    said = SimpleNamespace(sentence="jerk.x: too much")
+    failed = dataclasses.replace(plan.verdict, passed=False, faults=(said,))
+    monkeypatch.setattr(export, "plan_in", lambda _: dataclasses.replace(plan, verdict=failed))
+    options = "--for", "klipper", "--tolerance", str(TOLERANCE), "-o", tmp_path / "out"
+    done = run("export", tmp_path, *options)
+    assert done.exit_code == 1
+    assert done.stdout.startswith("verdict FAILED, and these files hold that motion: jerk.x: too much")
+    monkeypatch.setattr(export, "plan_in", lambda _: plan)
+    assert run("export", tmp_path, *options[:-1], tmp_path / "again").exit_code == 0
 
 
 def test_command(plan: Plan, tmp_path: Path) -> None:

@@ -32,6 +32,11 @@ def table(directory: Path) -> dict[str, np.ndarray]:
     return {name: read[name] for name in read.dtype.names}
 
 
+def far(places: list[np.ndarray], motion: Trajectory) -> float:
+    """How far places (T,) of each axis are from the setpoints at most, as the crow flies: of each axis alone it was told."""
+    return float(np.linalg.norm(np.stack(places, axis=1) - motion.position, axis=1).max())
+
+
 @pytest.mark.shows("export-pvt", "compared: SciPy's cubics between the rows")
 @pytest.mark.parametrize("within", [1e-4, 1e-3, 1e-2])
 def test_cubics_between_rows_stay_within_the_distance(
@@ -40,13 +45,8 @@ def test_cubics_between_rows_stay_within_the_distance(
     periods, miss = write_table(tmp_path, motion, Table(within=within))
     rows = table(tmp_path)
     assert miss <= within
-    off = [
-        np.abs(
-            CubicHermiteSpline(rows["t"], rows[axis], rows[f"v{axis}"])(motion.t) - motion.position[:, k]
-        ).max()
-        for k, axis in enumerate(motion.axes)
-    ]
-    assert max(off) == pytest.approx(miss, abs=2e-8)
+    places = [CubicHermiteSpline(rows["t"], rows[axis], rows[f"v{axis}"])(motion.t) for axis in motion.axes]
+    assert far(places, motion) == pytest.approx(miss, abs=2e-8)
     assert (rows["t"][0], rows["t"][-1]) == pytest.approx((motion.t[0], motion.t[-1]), abs=1e-9)
     assert 1 < periods <= PERIODS_MAX
 
@@ -73,21 +73,20 @@ def test_straight_rows_at_the_cycle_of_a_drive(tmp_path: Path, motion: Trajector
     assert read.dtype.names == ("t", "x", "y", "z")
     assert periods == round(0.004 / motion.dt)
     assert np.diff(read["t"])[:-1] == pytest.approx(0.004, abs=1e-9)
-    off = [
-        np.abs(np.interp(motion.t, read["t"], read[axis]) - motion.position[:, k]).max()
-        for k, axis in enumerate("xyz")
-    ]
-    assert max(off) == pytest.approx(miss, abs=2e-8)
+    places = [np.interp(motion.t, read["t"], read[axis]) for axis in "xyz"]
+    assert far(places, motion) == pytest.approx(miss, abs=2e-8)
 
 
 @pytest.mark.shows("export-twincat", "exact: columns of the file")
 def test_tables_of_a_time_and_a_position(tmp_path: Path, motion: Trajectory) -> None:
     _, miss = write_table(tmp_path, motion, Table(kind="twincat", within=1e-2))
     assert sorted(file.name for file in tmp_path.iterdir()) == ["x.txt", "y.txt", "z.txt"]
-    for k, axis in enumerate("xyz"):
+    places = []
+    for axis in "xyz":
         t, place = np.loadtxt(tmp_path / f"{axis}.txt").T
         assert (np.diff(t) > 0).all()
-        assert np.abs(np.interp(motion.t, t, place) - motion.position[:, k]).max() <= miss + 2e-8
+        places.append(np.interp(motion.t, t, place))
+    assert far(places, motion) == pytest.approx(miss, abs=2e-8)
     assert miss <= 1e-2
 
 
@@ -101,7 +100,7 @@ def test_a_message_of_ros(tmp_path: Path, motion: Trajectory) -> None:
     assert all(0 <= each["nanosec"] < 10**9 for each in when)
     place = np.array([point["positions"] for point in said["points"]])
     speed = np.array([point["velocities"] for point in said["points"]])
-    off = np.abs(1e3 * CubicHermiteSpline(t, place, speed)(motion.t) - motion.position).max()
+    off = far(list(1e3 * CubicHermiteSpline(t, place, speed)(motion.t).T), motion)
     assert off == pytest.approx(miss, abs=1e-6)
 
 

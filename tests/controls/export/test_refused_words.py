@@ -82,7 +82,7 @@ def test_a_sinumerik_program_is_exported_whatever_its_file_is_called(tmp_path: P
     """The text that it is written out as was read by the ending of the file, as a Sinumerik's, and refused."""
     job = tmp_path / "JOB.MPF"
     job.write_text(
-        "N10 G71 G90 G17\nN20 R1=10\nN30 G0 X0 Y0 Z5\nN40 G1 X=R1 F500\nN50 G2 X20 Y0 CR=5\nN60 M30\n"
+        "N10 G71 G90 G17\nN20 R1=10\nN30 G0 X0 Y0 Z5\nN40 G1 X=R1 F500\nN50 G2 X20 Y0 CR=6\nN60 M30\n"
     )
     made = planner.plan(planner.read_program(job, machine="mill"), "mill", method="stop")
     written = Candidates(made, CONTROLS["grbl"], 0.05)

@@ -119,3 +119,22 @@ def test_command_writes_new_directories_only(tmp_path: Path, motion: Trajectory)
         assert refused.exit_code == 2
         assert said in refused.output
     assert sorted(file.name for file in tmp_path.iterdir()) == ["plan", "pvt", "stream"]
+
+
+@pytest.mark.parametrize("purpose", ["linuxcnc-stream", "pvt"])
+def test_a_motion_that_failed_its_verdict_is_said_first(tmp_path: Path, purpose: str) -> None:
+    """Drives and controls would run it, and nothing in the output told."""
+    job, out = tmp_path / "job.ngc", tmp_path / "out"
+    job.write_text(
+        "G21 G90\nG1 X10 F6000\n" + "".join(f"G1 X{10 - k} Y{k % 2}\n" for k in range(1, 9)) + "M2\n"
+    )
+    method = ("--method", "fir-plain", "--tolerance", "0.1")
+    assert run("plan", job, "-m", "mill", *method, "-o", out).exit_code == 1
+    done = run("export", out, "--for", purpose, "-o", tmp_path / "made")
+    assert done.exit_code == 1
+    assert done.stdout.startswith("verdict FAILED, and these files hold that motion: ")
+    assert (tmp_path / "made").is_dir()
+    (out / "summary.json").unlink()
+    alone = run("export", out, "--for", purpose, "-o", tmp_path / "alone")
+    assert alone.exit_code == 0
+    assert "'planner verify' judges it" in alone.output

@@ -202,6 +202,14 @@ def test_what_cannot_be_used_is_refused(tmp_path: Path, text: str, options: dict
         imported(tmp_path, text, **options)
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
+def test_settings_as_windows_saves_them(tmp_path: Path, encoding: str) -> None:
+    """What a control prints, sent into a file by its shell, was "no settings found"."""
+    file = tmp_path / "saved.txt"
+    file.write_bytes(GRBL.replace("\n", "\r\n").encode(encoding))
+    assert import_machine(file).text.replace("saved", "settings") == imported(tmp_path, GRBL).text
+
+
 def test_command_writes_a_machine_file_that_loads(tmp_path: Path) -> None:
     settings, file = tmp_path / "grbl.txt", tmp_path / "my.toml"
     settings.write_text(GRBL)
@@ -212,6 +220,11 @@ def test_command_writes_a_machine_file_that_loads(tmp_path: Path) -> None:
     again = run("machine", "import", settings, "-o", file)
     assert again.exit_code == 2
     assert "exists already" in again.output
+    assert run("machine", "import", settings, "-o", settings, "--force").exit_code == 2
+    assert settings.read_text() == GRBL
+    forced = run("machine", "import", settings, "-o", file, "--force", "--set", "y.jerk=9e3")
+    assert forced.exit_code == 0, forced.output
+    assert load_machine(file).axes["y"].jerk == pytest.approx(9000.0)
     assert run("machine", "import", settings, "-o", tmp_path / "b.toml", "--set", "x.jerk").exit_code == 2
     assert not (tmp_path / "b.toml").exists()
 

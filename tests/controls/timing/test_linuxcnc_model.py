@@ -158,6 +158,7 @@ LONG_LEGS = "%\n(legs)\nG21 F6000\nG1 X40\nY40\nX0\nY0\nM2\n%\n"
 DENSE = "G21 F6000\n" + "".join(
     f"G1 X{10 * np.cos(a) - 10:.3f} Y{5 * np.sin(2 * a):.3f}\n" for a in np.linspace(0, 6, 600)
 )
+DENSE += "M2\n"
 
 
 def test_corners_with_long_legs_keep_their_own_words(tmp_path: Path) -> None:

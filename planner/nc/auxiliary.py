@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
+from planner.base.units import MILLISECOND, MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.machine.parts import TOLERANCE_MIN
 from planner.nc import codes
 from planner.nc.block_table import BlockTable
@@ -58,17 +58,25 @@ def set_feed(
         findings.assume("F0 keeps the feed before it, as Marlin has it", block.line)
         return
     state.feed_zero = "" if feed else f" (F0 in line {block.line}, column {column(block.at['F'])}, is none)"
-    state.feed_unit = state.unit
+    code, before = block.g.get("units"), state.unit
+    state.feed_unit = before if code is None or not state.own_feed else unit_of(code)
     if mode == "per minute":
-        state.feed = feed * state.unit / SECONDS_PER_MINUTE * state.feed_factor
+        state.feed = feed * state.feed_unit / SECONDS_PER_MINUTE * state.feed_factor
     else:
-        state.feed_per_turn = feed * state.unit
+        state.feed_per_turn = feed * state.feed_unit
         state.feed = state.feed if feed else 0.0
-    code = block.g.get("units")
-    if code is not None and (code == 200) != (state.unit != 1.0):
-        unit, per = "mm" if state.unit == 1.0 else "inch", mode.removeprefix("per ")
+    if code is not None and state.feed_unit != unit_of(code):
+        unit, per = "mm" if before == 1.0 else "inch", mode.removeprefix("per ")
         text = f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line"
-        findings.note(text, block.line)
+        if state.seconds_meant or state.strict:
+            findings.note(text, block.line)
+        else:
+            findings.assume(f"{text}, as in LinuxCNC; Fanuc and grbl read it behind (--dialect)", block.line)
+
+
+def unit_of(code: int) -> float:
+    """mm per programmed unit of length behind G20 or G21, by ten times the code."""
+    return MM_PER_INCH if code == 200 else 1.0
 
 
 def take_default(

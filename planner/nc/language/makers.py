@@ -20,7 +20,7 @@ from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.making import TAPPED, Given, Maker, Making, Row, around
-from planner.nc.language.rows import STANDS, TravelRow, require, turned
+from planner.nc.language.rows import STANDS, F, TravelRow, require, turned
 from planner.nc.language.travel import FRAME_CHANGES, ContourWay
 from planner.nc.language.tree import Expression, MadeRows, SourcePlace, made
 from planner.nc.program import Kind
@@ -29,7 +29,6 @@ AXES = "XYZ"
 FRAMES = ("TRANS", "ROT", "SCALE", "MIRROR")  # of Siemens, with A before them where they add
 _G63 = 63.0
 _FLAT = 1e-9  # relative, below which three points are on a line
-_F = ord("F")
 
 
 def siemens_frame(making: Making, given: Given, *, name: str) -> Iterator[Row]:
@@ -131,20 +130,24 @@ def depart(making: Making, given: Given, *, kind: str) -> None:
 
 def _way(making: Making, given: Given, name: str, kind: str) -> ContourWay:
     scale = making.travel.scale()
-    words = [(_F, given["F"], making.place.at)] if "F" in given else []
+    words = [(F, given["F"], making.place.at)] if "F" in given else []
     row, angle = TravelRow(words, making.place.line, making.frame), given.get("CCA", 0.0)
     length, radius = (given.get(word, 0.0) * making.unit * scale for word in ("LEN", "R"))
     return ContourWay(name, kind, row, making.place.at, length, radius, angle)
 
 
-def corner(place: SourcePlace, kind: str, size: Expression, *, modal: bool = False) -> MadeRows:
-    """The statement of a rounding or chamfer (corner_moves.KINDS) at the end of the next move."""
-    return made(place, partial(_corner, kind=kind, modal=modal), size=size)
+def corner(
+    place: SourcePlace, kind: str, size: Expression, *, modal: bool = False, feed: Expression | None = None
+) -> MadeRows:
+    """The statement of a rounding or chamfer (corner_moves.KINDS) at the end of the next move, with its `feed`."""
+    fed = {} if feed is None else {"F": feed}
+    return made(place, partial(_corner, kind=kind, modal=modal), size=size, **fed)
 
 
 def _corner(making: Making, given: Given, *, kind: str, modal: bool) -> None:
     require(given["size"] >= 0.0, "a rounding or chamfer is not negative")
-    making.travel.corner(kind, given["size"] * making.unit, making.place.line, modal=modal)
+    size, feed = given["size"] * making.unit, given.get("F")
+    making.travel.corner(kind, size, making.place.line, modal=modal, feed=feed)
 
 
 def _direction(making: Making) -> complex:
@@ -235,7 +238,7 @@ def tap_path(making: Making, given: Given, *, code: float) -> Iterator[Row]:
     """G331 and G332, in and out at lead times speed, and G63, at F: a straight move between full stops."""
     state = making.interpreter.state
     speed = given.get("S", state.spindle.speed)
-    feed = given.get("F", state.feed * SECONDS_PER_MINUTE / making.unit)
+    feed = given.get("F", state.word_feed)
     if code != _G63:
         feed = abs(given["lead"]) * speed
     require(feed > 0.0, "tapping by G331 needs the lead (K) and the speed S, G63 its F")

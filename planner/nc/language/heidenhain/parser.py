@@ -12,7 +12,7 @@ from planner.nc.language.heidenhain import cycles, moves, patterns, text
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import files, procedure_name
 from planner.nc.language.makers import compensate, corner
-from planner.nc.language.making import Cycle, assumed_row
+from planner.nc.language.making import Cycle
 from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source
 from planner.nc.language.system_variables import PositionVariables, position
@@ -158,12 +158,12 @@ class HeidenhainParser(Definitions):
         if rounded:
             block.take(r"\s*R(?=\s*[-+.\dQ])")
         number = block.value()
-        feed = block.take(r"\s*F\s*(?=[-+.\dQA])")
-        if feed and not block.take(r"AUTO\b"):
-            block.value()
+        feed = None
+        if block.take(r"\s*F\s*(?=[-+.\dQA])"):
+            feed = self.moves.automatic if block.take(r"AUTO\b") else block.value()
         block.end("nothing but a feed may follow the number of RND and CHF")
-        said = [assumed_row(block.place, "feed of corners")] if feed else []
-        return [*said, corner(block.place, "RND" if rounded else "CHR", number)]
+        feed = None if feed is None else self.moves.scaled(feed)
+        return [corner(block.place, "RND" if rounded else "CHR", number, feed=feed)]
 
     def _arc(self, block: text.Block) -> text.Rows:
         name, given = block.function, text.items(block)

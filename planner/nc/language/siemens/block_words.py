@@ -137,6 +137,12 @@ class BlockWords(Commands):
             row.take("GXYZS")
         if 4.0 in row.codes:
             self._dwell(reader, row)
+        elif self.feed_factor != 1.0 and not self.inverse_time:
+            factor = tree.Number(self.feed_factor)
+            row.words = [
+                word if word.letter != "F" else tree.word("F", word.at, word.value * factor)
+                for word in row.words
+            ]
         ends = {f"M{number}" for number in (tables.RETURNS if self.source.file else (17,))}
         ended = [word for word in row.words if word.code in ends]
         row.words = [word for word in row.words if word not in ended]
@@ -196,8 +202,12 @@ class BlockWords(Commands):
             self.absolute = code == 90
             reader.require(reader.peek() != "(", f"G{code}(...) is not read")
         self.normal = PLANES.get(code, self.normal)
-        if code in (70, 71, 700, 710):
-            self.unit = MM_PER_INCH if code in (70, 700) else 1.0
+        self.inverse_time = code == 93 or (self.inverse_time and code not in tables.FEED_MODES)
+        if code in (70, 71, 700, 710):  # F beside it is in the new unit
+            self.body.append(tree.row(reader.place._replace(at=at), ("G", tables.CODES[code][0])))
+            unit = MM_PER_INCH if code in (70, 700) else 1.0
+            self.feed_factor = self.source.unit / unit if code in (70, 71) else 1.0
+            return []
         if f"G{code}" in tables.REFUSED and not (code == 451 and not self.compensates):
             raise reader.fault(tables.refusal(f"G{code}"), at - reader.start)
         if code in (62, 621):

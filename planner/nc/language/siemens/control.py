@@ -29,7 +29,9 @@ class Control(LineParser):
         self.fastest: tree.Expression | None = None  # speed of the spindle under G96 (LIMS)
         self.handed_back: list[tuple[tree.Parameter, tree.Expression]] = []  # values of PROC at its end
         self.absolute = True  # G90 is in force
-        self.unit = 1.0  # mm per unit of the program
+        # what F is multiplied with: under G70 and G71 it stays in the unit that the control starts with
+        self.feed_factor = 1.0
+        self.inverse_time = False  # G93 is in force
         self.cycle: list[tree.Statement] | None = None  # of MCALL, which follows every row that moves
         self.compensates = bool(_COMPENSATES.search(source.words.data))  # the file has G41 or G42
 

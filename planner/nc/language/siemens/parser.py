@@ -60,6 +60,9 @@ class SiemensParser(BlockWords):
         same = np.isin(letter, [ord(c) for c in tables.PLAIN_LETTERS])
         same &= (letter != ord("G")) | np.isin(value, tables.SAME_CODES)
         same &= (letter != ord("M")) | ~np.isin(value, tables.RETURNS if self.source.file else (17,))
+        is_code, other = letter == ord("G"), 70.0 if self.source.unit == 1.0 else 71.0
+        if (is_code & (value == other)).any():  # F has another unit than lengths
+            same &= (letter != ord("F")) & ~(is_code & (value == 94.0))
         targets = [int(label) for label in _TARGETS.findall(words.data)]
         same &= ~((letter == ord("N")) & np.isin(value, targets))
         found = words.rows_with(np.flatnonzero(~same))

@@ -27,6 +27,7 @@ CODES: dict[int, tuple[float, ...]] = {
     **dict.fromkeys((40, 41, 42, 110, 111, 112, 290, 450, 451, 460, 601, 602, 603, 621, 62, 25, 26, 140), ()),
     **dict.fromkeys(range(505, 600), (54.1,)),
 }  # fmt: skip
+FEED_MODES = (94, 95, 96, 97, 961, 962, 971, 972, 973)  # that end G93
 SYSTEMS_FURTHER = 500  # G505 is the work system 5
 # Commands that move nothing and change nothing of what is planned, with or without arguments or a value:
 # feedforward, compressors (their tolerance is the program's), how orientations change where that is as

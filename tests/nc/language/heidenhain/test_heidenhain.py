@@ -104,6 +104,14 @@ def test_a_rounded_rectangle_of_one_coordinate_each() -> None:
     np.testing.assert_allclose(found.arc_sweep, np.pi / 2, atol=1e-9)
 
 
+def test_a_feed_of_a_corner_is_that_of_the_corner_alone() -> None:
+    text = "L X+0 Y+0 FMAX\nL X+40 F500{0}\nRND R5 F50\nL Y+30\nCHF 2 FQ1\nL X+9 F700\nRND R2\nL Y+9\nRND R1 F AUTO\nL X+30"
+    feeds = [500, 50, 500, 60, 700, 700, 700, 300, 700]
+    found = read("Q1 = 60\nTOOL CALL 1 Z S500 F300\n" + text.format(""))
+    assert (found.feed[found.kind != Kind.RAPID][1:] * 60).tolist() == pytest.approx(feeds)
+    assert not [note for note in found.assumptions if "RND" in note]
+
+
 def test_labels_repeats_and_parameters() -> None:
     found = read(
         """FN 0: Q1 = +5

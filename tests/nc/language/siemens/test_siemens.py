@@ -11,6 +11,7 @@ from language_programs import same
 
 from planner.base.errors import InputError
 from planner.machine import load_machine
+from planner.machine.parts import DialectData
 from planner.nc.program import Kind, PathControl, Program
 from planner.nc.reader import parse_program, read_program
 from planner.nc.reading import Reading
@@ -149,10 +150,22 @@ def test_deep_holes_are_drilled_by_infeeds(out: int) -> None:
     found = read(f"G90 G0 X0 Y0 Z30 F300\nCYCLE83(20,0,2,-20,,-8,,3,0,0,1,{out})")
     back = [-7, 2][out]
     feeds = found.end[found.kind == Kind.LINE, 2].tolist()
-    assert feeds == pytest.approx([-8, -13, -16, -19, -20])
+    assert feeds == pytest.approx([-8, -13, -16, -18, -20])
     assert found.end[3, 2] == back
     assert found.end[-1, 2] == 20
     assert read("G0 Z30 F300\nCYCLE83(20,0,2,-20,,-30,,0,0,0,1,1)").end[2, 2] == -20
+
+
+def test_f_has_the_unit_that_the_control_starts_with_under_g70_and_g71() -> None:
+    """G70 and G71 are of lengths alone; G700 and G710 of F, too, also on their own line (G functions, group 13)."""
+    text = "G70 G90 G0 X1\nG1 X2 F100\nG95 S100 X3 F2\nG93 X4 F2\nG94 X5 F=R1+50\nG71 X1\nG700 X2 F10\nX3 F20"
+    feeds = [100, 200, 50.8, 50, 50, 254, 508, 508, 9, 8]
+    found = read(f"{text}\nG70 X4\nX5 F9\nG710 X6 F8")
+    assert (found.feed[1:] * 60).tolist() == pytest.approx(feeds)
+    inch = MILL.model_copy(update={"dialect": DialectData(inch=True)})
+    found = parse_program("G90 G1 X1 F1\nG71 X2 F2\nX3\nG70 X4 F3\nG710 X5 F4", inch, SIEMENS)
+    assert (found.feed * 60).tolist() == pytest.approx([25.4, 50.8, 50.8, 76.2, 4])
+    assert found.end[:, 0].tolist() == pytest.approx([25.4, 2, 3, 101.6, 5])
 
 
 def test_exact_stops_and_units() -> None:

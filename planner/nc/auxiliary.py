@@ -107,7 +107,7 @@ def check_feed(state: State, block: Block) -> None:
         block.require(state.spindle.speed > 0, text)
         if state.spindle.surface_speed:
             return  # its feed depends on the diameter: `surface_feed`
-        state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE
+        state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE * state.feed_factor
     remedy = "write an F word on this line or before it" + ", or feed_default into the machine file" * (
         not state.fed
     )
@@ -136,7 +136,7 @@ def surface_feed(state: State, radius: float, word: int) -> float:
     if math.isinf(turns):
         move = "a move to the spindle's axis under a constant surface speed (G96) without a largest speed"
         raise WordFault(word, f"{move} has no feed; write G50 S, or D beside G96")
-    return state.feed_per_turn * turns / SECONDS_PER_MINUTE
+    return state.feed_per_turn * turns / SECONDS_PER_MINUTE * state.feed_factor
 
 
 def surface_parts(state: State, start: float, end: float) -> list[float]:
@@ -155,11 +155,12 @@ def surface_parts(state: State, start: float, end: float) -> list[float]:
 
 
 def feed_of_time(state: State, block: Block, length: float, findings: Findings) -> None:
-    """Under G93 the feed of a block of this length [mm]; that of one that goes nowhere is any."""
+    """Under G93 the feed of a block of this length [mm], of an arc of Fanuc's of this radius; that of one that goes
+    nowhere is any."""
     if state.feed_mode != "inverse time":
         return
     state.feed_unit = state.unit
-    state.feed = (length or state.unit) * block.value["F"] / SECONDS_PER_MINUTE
+    state.feed = (length or state.unit) * block.value["F"] / SECONDS_PER_MINUTE * state.feed_factor
     per_minute = length * block.value["F"] / state.unit
     if 0.0 < per_minute < LINUXCNC_SLOWEST:
         text = f"G93 asks for less than {LINUXCNC_SLOWEST:g} units/min, and keeps its time; LinuxCNC takes {LINUXCNC_SLOWEST:g}"

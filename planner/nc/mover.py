@@ -259,7 +259,8 @@ class Mover:
                 centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
                 size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
                 state.feed = auxiliary.surface_feed(state, abs(centre) + size, block.motion_word())
-            auxiliary.feed_of_time(state, block, length, self.findings)
+            timed = moves.arc_radius(state.position, arc, normal) if state.fanuc else length
+            auxiliary.feed_of_time(state, block, timed, self.findings)
             if self.cutter is not None:
                 self.cutter.arc(target, arc, block.line)
         finally:

@@ -20,6 +20,7 @@ numbers and comments are left out. Numbers are rounded to `DECIMALS`.
 
 import math
 import re
+from collections.abc import Sequence
 from functools import cache
 from pathlib import PurePath
 from typing import NamedTuple
@@ -42,6 +43,7 @@ FEED_MIN = 0.01  # the lowest feed that is written [mm/s]: no control moves slow
 SAME_FEED = 1e-6  # a feed within this share of the programmed one is that [-]: rounding of lengths and times
 G93, G94, G95 = 93, 94, 95
 _F, _G = ord("F"), ord("G")
+_PERCENT = 220.0  # M code
 _NUMBER = re.compile(NUMBER)
 STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
@@ -269,10 +271,16 @@ def _arc(program: Program, row: int, position: FloatArray, end: FloatArray) -> s
 
 class _Flat:
     """Collects the lines of a program while it is expanded. With `points` lengths and the times of dwells are
-    written with a point, because the machine reads them otherwise without."""
+    written with a point, because the machine reads them otherwise without. The percent of F that a Sinumerik's
+    program sets (OVR, here M220) is in the F words: other controls have no such code."""
 
     def __init__(self, source: str, points: bool):
         self.points, self._dwells = points, DwellWords()
+        self._share, self._feed, self._inverse = (
+            1.0,
+            0.0,
+            False,
+        )  # of F; F in force, 0 for none; G93 is in force
         head = f"{in_comment(source)}, expanded by feedrate-planner: parameters, loops and calls written out"
         self.lines = [f"({head})"]
 
@@ -283,7 +291,7 @@ class _Flat:
         dwells = set(self._dwells.find(words)) if self.points else set()
         for row in range(len(first) - 1):
             line = []
-            for w in range(first[row], first[row + 1]):
+            for w in self._counted(range(first[row], first[row + 1]), letters, values):
                 if letters[w] not in _LEFT_OUT:
                     number = written(values[w])
                     is_length = self.points and letters[w] in LENGTHS and "." not in number
@@ -291,6 +299,22 @@ class _Flat:
                     line.append(chr(letters[w]) + number + "." * with_point)
             if line:
                 self.lines.append(" ".join(line))
+
+    def _counted(self, row: range, letters: list[int], values: list[float]) -> Sequence[int]:
+        """The words of a row to write, with the share of F in the values; of M220 F, if one is in force."""
+        for w in row:
+            if letters[w] == _G and values[w] in (G93, G94, G95):
+                self._feed, self._inverse = 0.0, values[w] == G93
+        percent = next((values[w] for w in row if letters[w] == ord("S")), 0.0)
+        if percent and any(letters[w] == ord("M") and values[w] == _PERCENT for w in row):
+            self._share = percent / 100.0
+            letters[row[0]], values[row[0]] = _F, self._feed * self._share
+            return row[:1] if self._feed else ()
+        for w in row:
+            if letters[w] == _F:
+                self._feed = 0.0 if self._inverse else values[w]
+                values[w] *= self._share
+        return row
 
     def text(self) -> str:
         """The program, with M2 at its end if it has no end of its own."""

@@ -67,6 +67,15 @@ def test_under_g93_and_at_the_tip_f_is_what_it_is_elsewhere() -> None:
     assert program.feed[program.kind == Kind.LINE] * 60 == pytest.approx([300])
 
 
+def test_fanuc_counts_the_radius_of_an_arc_under_g93() -> None:
+    """FRN is the feed over the length of a line and over the radius of an arc (Fanuc, inverse time feed)."""
+    text = "G21 G90 G17\nG93 G1 X10. F2\nG2 X30. I10. F2\nG3 X30. Z9. I5. F2\n"
+    program = parse_program(text, machine(), FANUC)
+    assert program.feed * 60 == pytest.approx([20, 20, 10])
+    program = parse_program(text, machine(), LINUXCNC)
+    assert program.feed * 60 == pytest.approx([20, 20 * math.pi, 2 * math.hypot(10 * math.pi, 9)])
+
+
 @pytest.mark.parametrize("mode", ["G94", "G95 S2"])
 def test_f_beside_a_change_of_the_unit(mode: str) -> None:
     text, times = f"{mode} G20 G1 X1 F10\nG21 F100 X50\n", 1 if mode == "G94" else 2

@@ -46,8 +46,12 @@ def test_the_first_infeed_has_its_share_of_the_feed(share: str, infeeds: str, mo
 
 
 def test_percent_of_f_counts_once() -> None:
-    found = read("OVR=50\nCYCLE840(20,0,2,,10,0,4,3,1)\nG63 Z0\nG1 X99")
-    assert (found.feed[found.kind == Kind.LINE] * 60).tolist() == pytest.approx([100] * 4)
+    found = read("OVR=50\nCYCLE840(20,0,2,,10,0,4,3,1)\nG63 Z0\nG1 X99\nG95 F0.1 X89\nG93 F2 X79\nG94 F8 X0")
+    feeds = [100, 100, 100, 100, 50, 10, 4]
+    assert (found.feed[found.kind == Kind.LINE] * 60).tolist() == pytest.approx(feeds)
+    head = "G18 G90 G71 DIAMON LIMS=2000 OVR=50\nG0 X50 Z0\nG96 S200 F0.2 M3\nG1 Z-5"
+    turned = read(head, "").feed[-1] * 60
+    assert turned == pytest.approx(0.5 * 0.2 * 200_000 / (50 * math.pi))
 
 
 @pytest.mark.parametrize("modal", [False, True])

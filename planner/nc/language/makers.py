@@ -10,6 +10,7 @@ their order, which is not documented, is refused. A shift alone becomes a G52; e
 the coordinates of the work system (`travel`).
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from functools import partial
 
@@ -189,6 +190,7 @@ def _arc(making: Making, given: Given, centre: complex, left: bool) -> list[Row]
     to = at_place(centre, here, normal) - here
     row: Row = [("G", 3.0 if left else 2.0), *((letter, given[letter]) for letter in "F" if letter in given)]
     row += [(letter, given.get(letter, float(at))) for letter, at in zip(AXES, here, strict=True)]
+    row = [(letter, value * (making.per_radius if letter == "X" else 1.0)) for letter, value in row]
     row += [("IJK"[a], float(to[a])) for a in IN_PLANE[normal]]
     return [row] if making.absolute else [[("G", 90.0)], row, [("G", 91.0)]]
 
@@ -202,7 +204,7 @@ def _in_its_plane(making: Making, given: Given, behind: str = "") -> complex:
 
 def tangent_arc(making: Making, given: Given) -> Iterable[Row]:
     """CT: the arc to X Y Z that goes on in the direction of the last move. Raises ValueError."""
-    normal = making.interpreter.state.normal
+    normal, given = making.interpreter.state.normal, making.as_radii(given)
     left, here = 1j * _direction(making), in_plane(np.array(making.here()), normal)
     way = _in_its_plane(making, given) - here
     along = 2.0 * (way.conjugate() * left).real
@@ -214,7 +216,7 @@ def tangent_arc(making: Making, given: Given) -> Iterable[Row]:
 
 def arc_through(making: Making, given: Given) -> Iterable[Row]:
     """CIP: the arc to X Y Z through X1 Y1 Z1. Raises ValueError."""
-    axis = AXES[making.interpreter.state.normal]
+    axis, given = AXES[making.interpreter.state.normal], making.as_radii(given)
     level = making.here()[AXES.index(axis)]
     if any(abs(given.get(letter, level) - level) > _FLAT for letter in (axis, axis + "1")):
         raise ValueError("a CIP out of its plane (G17, G18, G19) is not read; write it with lines")
@@ -247,6 +249,17 @@ def tap_path(making: Making, given: Given, *, code: float) -> Iterator[Row]:
     stop: Row = [("G", 4.0), ("P", 0.0)]
     turn: list[Row] = [[("S", speed)]] if "S" in given else []
     return around(making, [*turn, stop, [("G", 1.0), ("F", feed), *ends], stop], feed=True)
+
+
+def threaded(making: Making, given: Given) -> list[Row]:
+    """G33 to absolute X, Y, Z, its lead K along the axis that moves most, as on Fanuc's controls and a Sinumerik: the
+    pitch of LinuxCNC's G33 is along the cut."""
+    to, here = making.as_radii(given), zip(AXES, making.here(), strict=True)
+    ways = [to[axis] - at for axis, at in here if axis in to]
+    longest = max(map(abs, ways), default=0.0)
+    pitch = given["K"] * (math.hypot(*ways) / longest if longest else 1.0)
+    row: Row = [("G", 33.0), *((axis, given[axis]) for axis in AXES if axis in given), ("K", pitch)]
+    return [row] if making.absolute else [[("G", 90.0)], row, [("G", 91.0)]]
 
 
 def refuse(message: str) -> Maker:

@@ -97,6 +97,15 @@ class Making:
         x, y, z = self.travel.position() / self.unit
         return float(x), float(y), float(z)
 
+    @property
+    def per_radius(self) -> float:
+        """X words per radius: 2 where they are diameters, else 1."""
+        return 2.0 if self.interpreter.state.diameters else 1.0
+
+    def as_radii(self, given: Given) -> Given:
+        """The values with those of X as radii."""
+        return {c: value / self.per_radius if c[0] == "X" else value for c, value in given.items()}
+
     def tool_radius(self) -> float:
         """Radius of the loaded tool in the program's unit. Raises ValueError where it is not known."""
         found = self.travel.radius()

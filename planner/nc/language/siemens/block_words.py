@@ -116,7 +116,8 @@ class BlockWords(Commands):
                 row.before.insert(0, tree.made(reader.place, makers.compensate, side=_SIDES[int(code)]))
                 return
             if code in (0.0, 1.0, 2.0, 3.0):
-                self.circular, self.turns = False, code > 1.0
+                self.circular, self.turns, self.threading = False, code > 1.0, False
+            self.threading |= code == 33.0
             row.codes.add(code)
             if code == 9.0:
                 row.stops = True
@@ -156,8 +157,18 @@ class BlockWords(Commands):
             lead = next((given.pop(one) for one in "IJK" if one in given), tree.ZERO)
             tap = partial(makers.tap_path, code=min(taps))
             self.body.append(tree.made(place, tap, lead=lead, **self._absolutes(given)))
+        thread: list[tree.Statement] = []
+        if self.threading and row.has("XYZ"):
+            given = row.take("XYZIJK")
+            along = next((one for one in "KIJ" if one in given), None)
+            if along is None:
+                raise reader.fault("G33 needs its lead along the axis that moves most: K, I or J", 0)
+            lead = given.pop(along)
+            row.words = [word for word in row.words if word.code != "G33"]
+            thread = [tree.made(place, makers.threaded, K=lead, **self._absolutes(given))]
         if row.words or row.assigned:
             self.body.append(tree.Line(place, tuple(row.words), tuple(row.assigned)))
+        self.body += thread
         if row.stops:
             self.body.append(tree.row(place, ("G", 4.0), ("P", tree.ZERO)))
         if moved and self.cycle is not None:

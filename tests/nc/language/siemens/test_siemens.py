@@ -168,6 +168,50 @@ def test_f_has_the_unit_that_the_control_starts_with_under_g70_and_g71() -> None
     assert found.end[:, 0].tolist() == pytest.approx([25.4, 2, 3, 101.6, 5])
 
 
+def test_diameters_are_those_of_steps_positions_poles_and_points_of_arcs_too() -> None:
+    """DIAMON: G90, G91, AC, IC, $AA_IW and centres in absolute coordinates; I and RP are radii (NC programming, DIAMON)."""
+    text = """G18 G90 {0} F100
+G0 X{1} Z0
+X=IC({2})
+G91 X{2}
+X=AC({2})
+G90 R1=$AA_IW[X]
+G1 X=R1+{2} Z-5
+G2 X=IC({2}) Z-10 I=AC({3}) K=AC(-5)
+CIP X=IC({2}) Z=IC(-5) I1=IC({4}) K1=IC(-1)
+CT X=IC({2}) Z=IC(-1)
+G111 X{2} Z-10
+G1 AP=30 RP=10
+AP=60 RP=10
+G111 X0 Z0
+G1 AP=0 RP=20
+G3 AP=90 RP=20"""
+    places = np.array([20.0, 10.0, 30.0, 3.0])
+    diameters, radii = (
+        read(text.format(word, *(k * places))) for word, k in (("DIAMON", 1.0), ("DIAMOF", 0.5))
+    )
+    assert diameters.end[1:4, 0].tolist() == [15, 20, 5]
+    same(diameters, radii, apart=1e-9)
+
+
+def test_the_lead_of_a_thread_is_along_the_axis_that_moves_most() -> None:
+    """K of G33 is the lead along Z, I that along X of a thread that is wider (NC programming, G33)."""
+    text = "G90 G18 DIAM{} G0 X0 Z0 S500 M3\nG33 Z-10 K2\nZ-20 X12 K2\nG91 Z-5 X24 I2\nG90 X0 I=R1+2\nG0 X20"
+    for word, part in (("OF", 1.0), ("ON", 0.5)):
+        found = read(text.format(word))
+        lengths = [
+            1.0,
+            np.hypot(10, 12 * part) / max(10, 12 * part),
+            np.hypot(5, 24 * part) / (24 * part),
+            1.0,
+        ]
+        cut = found.kind == Kind.LINE
+        np.testing.assert_allclose(found.feed[cut] * 60, 1000 * np.array(lengths), rtol=1e-12)
+        assert found.end[cut][-1].tolist() == [0, 0, -25]
+    with pytest.raises(InputError, match="needs its lead along the axis"):
+        read("G18 S500 M3\nG33 Z-10 X5")
+
+
 def test_exact_stops_and_units() -> None:
     found = read("G700 G60 G1 X1 F60\nG64\nG9 X2\nX3")
     assert found.path_control[0] == PathControl.EXACT_STOP

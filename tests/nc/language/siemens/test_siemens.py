@@ -194,6 +194,41 @@ G3 AP=90 RP=20"""
     same(diameters, radii, apart=1e-9)
 
 
+def test_variables_of_the_kind_int_keep_whole_numbers() -> None:
+    """A value of the kind REAL is rounded where an INT is given it, from 0.5 on up (job planning, type conversion)."""
+    text = """DEF INT A, B=7, C[3]=(0.6,1.4,2)
+DEF REAL D=2.5
+A=B/2
+G0 X=A Y=B/2 Z=C[0]+C[1]
+A=D C[2]=-1.6
+X=A Y=D Z=C[2]
+FOR A=0.6 TO 2.9
+X=10*A
+ENDFOR"""
+    assert read(text).end.tolist() == [[4, 3.5, 2], [3, 2.5, -2], [10, 2.5, -2], [20, 2.5, -2]]
+    called = "%_N_M_MPF\nUP(2.7,2.7)\nM30\n%_N_UP_SPF\nPROC UP(INT A, REAL B)\nG0 X=A Y=B\nRET\n"
+    assert read(called).end.tolist() == [[3, 2.7, 0]]
+
+
+@pytest.mark.parametrize(
+    ("condition", "holds"),
+    [
+        ("R1==0.3", True), ("R1<>0.3", False), ("R1<=0.3", True), ("R2>=1", True), ("R1>0.3", True), ("R2<1", True),
+        ("R1==0.3000001", False),
+        ("R3==0", True), ("R3>=0", True), ("R1>=0.31", False), ("R2<=0.9", False),
+    ],
+)  # fmt: skip
+def test_numbers_are_equal_to_twelve_digits(condition: str, holds: bool) -> None:
+    """0.1 + 0.2 is 0.3; > and < are exact (job planning, "Precision correction on comparison errors")."""
+    found = read(f"R1=0.1+0.2 R2=1-1EX-14 R3=0\nIF {condition}\nG0 X1\nELSE\nG0 X2\nENDIF")
+    assert found.end[:, 0].tolist() == [1 if holds else 2]
+
+
+def test_a_loop_ends_at_a_sum_of_tenths() -> None:
+    found = read("R1=0\nWHILE R1<=0.3\nG0 X=R1\nR1=R1+0.1\nENDWHILE")
+    assert found.end[:, 0].tolist() == pytest.approx([0, 0.1, 0.2, 0.3])
+
+
 def test_the_lead_of_a_thread_is_along_the_axis_that_moves_most() -> None:
     """K of G33 is the lead along Z, I that along X of a thread that is wider (NC programming, G33)."""
     text = "G90 G18 DIAM{} G0 X0 Z0 S500 M3\nG33 Z-10 K2\nZ-20 X12 K2\nG91 Z-5 X24 I2\nG90 X0 I=R1+2\nG0 X20"

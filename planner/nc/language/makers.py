@@ -18,6 +18,7 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
+from planner.nc import arcs
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.making import TAPPED, Given, Maker, Making, Row, around
@@ -220,13 +221,12 @@ def arc_through(making: Making, given: Given) -> Iterable[Row]:
     level = making.here()[AXES.index(axis)]
     if any(abs(given.get(letter, level) - level) > _FLAT for letter in (axis, axis + "1")):
         raise ValueError("a CIP out of its plane (G17, G18, G19) is not read; write it with lines")
-    a = in_plane(np.array(making.here()), making.interpreter.state.normal)
-    u, w = _in_its_plane(making, given, "1") - a, _in_its_plane(making, given) - a
-    turn = (u.conjugate() * w).imag
-    if abs(turn) <= _FLAT * max(abs(u), abs(w)) ** 2:
+    here = in_plane(np.array(making.here()), making.interpreter.state.normal)
+    end = _in_its_plane(making, given)
+    found = arcs.arc_through(here, _in_its_plane(making, given, "1"), end)
+    if found is None or end == here:
         raise ValueError("the three points of CIP lie on a line: that is no arc; write G1")
-    centre = a + (abs(u) ** 2 * w - abs(w) ** 2 * u) * 1j / (2.0 * turn) * -1.0
-    return _arc(making, given, centre, turn > 0)
+    return _arc(making, given, found[0], found[1] > 0)
 
 
 def dwell_turns(making: Making, given: Given) -> list[Row]:

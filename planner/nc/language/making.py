@@ -25,6 +25,7 @@ ASSUMED = {
     "spindle position": "positioning the spindle (SPOS) takes no time in this plan",
     "preset": "the datum of cycle 247 is that of the work offset in force: the preset table is the control's",
     "retraction": "MB MAX leads to machine zero in z: where its travel ends the control knows",
+    "feed of linear axes": "F of X, Y and Z that move beside rotary axes is their own speed",
     "waits": "waits for other channels and spindles (WAITM, WAITS) take no time",
     "tool offset": "offsets of tools (D) are not added: z is that of the tool's tip",
     "tool centre feed": "F holds for the tool's centre (CFTCP); CFC and CFIN, the control's default, have it on the contour of arcs",

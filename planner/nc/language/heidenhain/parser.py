@@ -12,7 +12,7 @@ from planner.nc.language.heidenhain import cycles, moves, patterns, text
 from planner.nc.language.heidenhain.definitions import REMEDY, Definitions
 from planner.nc.language.heidenhain.flow import files, procedure_name
 from planner.nc.language.makers import compensate, corner
-from planner.nc.language.making import Cycle
+from planner.nc.language.making import Cycle, assumed_row
 from planner.nc.language.run import Dialect
 from planner.nc.language.source import Source
 from planner.nc.language.system_variables import PositionVariables, position
@@ -134,11 +134,14 @@ class HeidenhainParser(Definitions):
         return ends
 
     def _straight(self, block: text.Block) -> text.Rows:
-        given, name = text.items(block, turning=self.source.at_tip), block.function
+        given, name = text.items(block, self.source.rotary), block.function
         before, after, machine = self._codes(block, given, straight=name == "L")
         if machine and any(relative for _, relative in given.axes.values()):
             raise block.fault("an incremental coordinate with M91 is not read; write the machine coordinate")
         lines: text.Rows = [*before, *self._side(block, given)]
+        mixed = given.axes.keys() & set("XYZ") and given.axes.keys() - set("XYZ")
+        if mixed and not given.fast and not self.source.at_tip:
+            lines.append(assumed_row(block.place, "feed of linear axes"))
         if name == "LP":
             self._need_pole(block)
             lines += self.moves.to_polar(block, given)

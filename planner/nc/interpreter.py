@@ -73,7 +73,7 @@ class Interpreter(Mover):
         self.splines = SplineReader()
         self.open_arcs: list[OpenArc] = []  # every arc that does not close
         self._dwells = DwellWords()
-        self.limits = LimitsInForce()
+        self.limits = LimitsInForce(reading.dialect)
         self.saved = SavedStates()
         self.ended = False  # M2, M30 or a second % was executed; later chunks are not
         self.archive: dict[str, Archived] = {}  # further programs of the file, by the names of their own

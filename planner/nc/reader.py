@@ -36,7 +36,7 @@ from planner.nc.reading import (
     KLIPPER,
     LATHE,
     LINUXCNC,
-    PRINTER,
+    PRINTERS,
     SIEMENS,
     Reading,
 )
@@ -169,7 +169,7 @@ def execute(
     if automatic:
         mark = "its %_N_" if interpreter.archive else detect.siemens_mark(words, source)
     siemens, first_line = bool(mark) or language == SIEMENS, int(words.line[0])
-    prints = (called is not None and called.dialect == KLIPPER) or language == PRINTER
+    prints = (called is not None and called.dialect == KLIPPER) or language in PRINTERS
     if not siemens and not reading.strict:
         extruder = automatic and machine is not None and EXTRUDER in machine.axes
         prints |= is_printer(words, extruder=extruder)

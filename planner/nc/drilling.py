@@ -188,7 +188,11 @@ def _check_words(state: State, block: Block, words: dict[str, float], findings: 
     code, name = state.motion, f"G{codes.number(state.motion)}"
     least = min(_infeeds(words, state)[c] for c in ("peck", "least"))
     text = f"{name} needs the depth of a peck as a Q word above 0"
-    block.require(least > 0 if code in PECKING else least >= 0, text, "Q" * ("Q" in block.at))
+    block.require(
+        least > 0 or (least == 0 and code in TAPPING) or code not in PECKING | TAPPING.keys(),
+        text,
+        "Q" * ("Q" in block.at),
+    )
     text = "a dwell must not be negative; write its seconds, such as P0.5"
     block.require(code not in DWELLING or words["P"] >= 0, text, "P")
     if state.fanuc and code in TAPPING.keys() | STOPPING and (code in TAPPING or not state.spindle.turning):
@@ -242,7 +246,7 @@ def _repeats(state: State, block: Block, hole: Hole) -> int:
     repeats = integer(block, count, 0 if state.fanuc else 1) if count else 1
     pecks = (
         (hole.clear - hole.bottom) / hole.least
-        if hole.code in PECKING or (hole.code in TAPPING and hole.least > 0.0)
+        if hole.code in PECKING | TAPPING.keys() and hole.least
         else 0.0
     )
     text = f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}"

@@ -13,13 +13,13 @@ import numpy as np
 
 from planner.base.arrays import Array
 from planner.base.kernels import njit
-from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import LEFT_OUT, PARKED, REFUSED, IgnoredWords
 from planner.nc.lexer import Words
 from planner.nc.moves import NUMBER_MAX
 from planner.nc.program import Kind
-from planner.nc.state import State, share_of_feed
+from planner.nc.state import State, straight_feed
 
 # Letters by their codes.
 _F, _G, _N, _O, _S = 70, 71, 78, 79, 83
@@ -68,9 +68,8 @@ def _run(rows, begin, fixed, position, block, event, refused_word, others):  # p
     others : of `IgnoredWords`; sets where axes are parked
     """
     letter, value, line, first, frame = rows
-    absolute, unit, feed_factor, path_control, tolerance, offset, axis_of, scale, turns, wrapped, together = (
-        fixed
-    )
+    absolute, unit, feed_factor, path_control, tolerance, offset = fixed[:6]
+    axis_of, scale, turns, wrapped, together = fixed[6:]
     treatment, parked = others
     row, blocks, events, refusals, motion, feed, feed_unit = begin
     axes = len(position)
@@ -123,23 +122,17 @@ def _run(rows, begin, fixed, position, block, event, refused_word, others):  # p
             event.letter[events], event.value[events] = _S, speed
             events += 1
         if moves:
-            goes = turned = False  # linear axes, rotary axes
             for axis in range(axes):
                 before = position[axis]
                 if not np.isnan(given[axis]):
                     step = given[axis] * scale[axis]
                     position[axis] = step + (offset[axis] if absolute else before)
                 way[axis] = position[axis] - before
-                if way[axis] != 0.0:
-                    goes |= not turns[axis]
-                    turned |= turns[axis]
                 block.end[blocks, axis] = position[axis]
             block.kind[blocks] = _LINE if motion == 1 else _RAPID
-            block.feed[blocks] = feed if motion == 1 else np.inf
-            if motion == 1 and together and (goes or turned):
-                block.feed[blocks] *= share_of_feed(way, turns, feed_unit)
-            if motion == 1 and turned and not goes:
-                block.feed[blocks] = feed / feed_unit * RAD_PER_DEG
+            block.feed[blocks] = np.inf
+            if motion == 1:
+                block.feed[blocks] = straight_feed(feed, way, turns, feed_unit, together)
             block.line[blocks] = line[row]
             block.path_control[blocks] = path_control
             block.tolerance[blocks] = tolerance

@@ -42,29 +42,28 @@ def _turns(letters: str) -> Array:
     return np.array([letter in DEGREES for letter in letters])
 
 
-def rotary_feed(feed: float, unit: float) -> float:
-    """Feed [rad/s] of a block of rotary axes alone, by that in force [mm/s] and mm per programmed unit."""
-    return feed / unit * RAD_PER_DEG
-
-
 @njit(cache=True)
-def share_of_feed(step, turns, degree):
-    """The speed of what `Program.feed` goes by, over that of all axes together.
+def straight_feed(feed, step, turns, unit, together):
+    """`Program.feed` of a straight move [mm/s; rad/s where only rotary axes move].
 
-    step   : (A,) of a straight move [mm; degrees], not all 0
-    turns  : (A,) True for rotary axes
-    degree : the length that a degree counts as [mm]
+    feed     : F in force [mm/s]
+    step     : (A,) the move [mm; degrees]
+    turns    : (A,) True for rotary axes
+    unit     : mm per programmed unit of length when F was given
+    together : F is the speed of all axes, a degree counting as a unit of length
     """
     first, further, turned = 0.0, 0.0, 0.0
     for axis in range(len(step)):
         if turns[axis]:
-            turned += (step[axis] * degree) ** 2
+            turned += (step[axis] * unit) ** 2
         elif axis < 3:
             first += step[axis] ** 2
         else:
             further += step[axis] ** 2
-    goes = first if first > 0.0 else further if further > 0.0 else turned
-    return math.sqrt(goes / (first + further + turned))
+    goes = first if first > 0.0 else further
+    if goes == 0.0 and turned > 0.0:
+        return feed / unit * RAD_PER_DEG
+    return feed * math.sqrt(goes / (first + further + turned)) if together and goes > 0.0 else feed
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ motion (pmCircleInit goes by a length, not by an angle). P adds P - 1 turns. Pla
 about z, (z, x) about y, (y, z) about x.
 """
 
+import cmath
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -31,6 +32,9 @@ CLOSURE_RELATIVE = 1e-3
 HALF_CIRCLE = 1e-12  # relative
 # two points are one [mm]: far below the finest digit of programs, far above the rounding of sums
 SAME_PLACE = 1e-7
+# Three points are on a line where the area of their parallelogram is below this share of that of a rectangle [-]: a
+# radius of 1e9 times the chord.
+ON_A_LINE = 1e-9
 # Below this angle [rad] some controls make a full turn of an arc (grbl 5e-7, previews 1e-6); twice the
 # rounding of a turn written out.
 FULL_TURN = 1e-6
@@ -134,3 +138,21 @@ def at_place(place: complex, others: FloatArray, normal: int) -> FloatArray:
     a, b = IN_PLANE[normal]
     point[a], point[b] = place.real, place.imag
     return point
+
+
+def arc_through(start: complex, through: complex, end: complex) -> tuple[complex, float] | None:
+    """Centre and sweep [rad], counter-clockwise positive, of the arc from `start` through `through` to `end` in a plane; a full
+    turn over the diameter start - through where the end is the start. None where the points are on a line.
+
+    With a = through - start, b = end - start the centre is start + i (|b|^2 a - |a|^2 b) / (2 a x b), and it turns left
+    where a x b > 0.
+    """
+    a, b = through - start, end - start
+    if b == 0.0 and a != 0.0:
+        return start + a / 2.0, 2.0 * math.pi
+    cross = (a.conjugate() * b).imag
+    if abs(cross) <= ON_A_LINE * abs(a) * abs(b):
+        return None
+    spoke = (abs(b) ** 2 * a - abs(a) ** 2 * b) * 0.5j / cross
+    sweep = cmath.phase((b - spoke) / -spoke) % (2.0 * math.pi)
+    return start + spoke, sweep if cross > 0 else sweep - 2.0 * math.pi

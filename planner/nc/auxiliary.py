@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.base.units import MILLISECOND, SECONDS_PER_MINUTE
+from planner.base.units import MILLISECOND, MM_PER_INCH, SECONDS_PER_MINUTE
 from planner.machine.parts import TOLERANCE_MIN
 from planner.nc import codes
 from planner.nc.block_table import BlockTable
@@ -58,17 +58,25 @@ def set_feed(
         findings.assume("F0 keeps the feed before it, as Marlin has it", block.line)
         return
     state.feed_zero = "" if feed else f" (F0 in line {block.line}, column {column(block.at['F'])}, is none)"
-    state.feed_unit = state.unit
+    code, before = block.g.get("units"), state.unit
+    state.feed_unit = before if code is None or not state.own_feed else unit_of(code)
     if mode == "per minute":
-        state.feed = feed * state.unit / SECONDS_PER_MINUTE * state.feed_factor
+        state.feed = feed * state.feed_unit / SECONDS_PER_MINUTE * state.feed_factor
     else:
-        state.feed_per_turn = feed * state.unit
+        state.feed_per_turn = feed * state.feed_unit
         state.feed = state.feed if feed else 0.0
-    code = block.g.get("units")
-    if code is not None and (code == 200) != (state.unit != 1.0):
-        unit, per = "mm" if state.unit == 1.0 else "inch", mode.removeprefix("per ")
+    if code is not None and state.feed_unit != unit_of(code):
+        unit, per = "mm" if before == 1.0 else "inch", mode.removeprefix("per ")
         text = f"F{feed:g} is {unit} per {per}: F acts before G{codes.number(code)} on the same line"
-        findings.note(text, block.line)
+        if state.seconds_meant or state.strict:
+            findings.note(text, block.line)
+        else:
+            findings.assume(f"{text}, as in LinuxCNC; Fanuc and grbl read it behind (--dialect)", block.line)
+
+
+def unit_of(code: int) -> float:
+    """mm per programmed unit of length behind G20 or G21, by ten times the code."""
+    return MM_PER_INCH if code == 200 else 1.0
 
 
 def take_default(
@@ -99,7 +107,7 @@ def check_feed(state: State, block: Block) -> None:
         block.require(state.spindle.speed > 0, text)
         if state.spindle.surface_speed:
             return  # its feed depends on the diameter: `surface_feed`
-        state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE
+        state.feed = state.feed_per_turn * state.spindle.speed / SECONDS_PER_MINUTE * state.feed_factor
     remedy = "write an F word on this line or before it" + ", or feed_default into the machine file" * (
         not state.fed
     )
@@ -128,7 +136,7 @@ def surface_feed(state: State, radius: float, word: int) -> float:
     if math.isinf(turns):
         move = "a move to the spindle's axis under a constant surface speed (G96) without a largest speed"
         raise WordFault(word, f"{move} has no feed; write G50 S, or D beside G96")
-    return state.feed_per_turn * turns / SECONDS_PER_MINUTE
+    return state.feed_per_turn * turns / SECONDS_PER_MINUTE * state.feed_factor
 
 
 def surface_parts(state: State, start: float, end: float) -> list[float]:
@@ -147,11 +155,12 @@ def surface_parts(state: State, start: float, end: float) -> list[float]:
 
 
 def feed_of_time(state: State, block: Block, length: float, findings: Findings) -> None:
-    """Under G93 the feed of a block of this length [mm]; that of one that goes nowhere is any."""
+    """Under G93 the feed of a block of this length [mm], of an arc of Fanuc's of this radius; that of one that goes
+    nowhere is any."""
     if state.feed_mode != "inverse time":
         return
     state.feed_unit = state.unit
-    state.feed = (length or state.unit) * block.value["F"] / SECONDS_PER_MINUTE
+    state.feed = (length or state.unit) * block.value["F"] / SECONDS_PER_MINUTE * state.feed_factor
     per_minute = length * block.value["F"] / state.unit
     if 0.0 < per_minute < LINUXCNC_SLOWEST:
         text = f"G93 asks for less than {LINUXCNC_SLOWEST:g} units/min, and keeps its time; LinuxCNC takes {LINUXCNC_SLOWEST:g}"

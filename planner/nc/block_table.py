@@ -13,7 +13,7 @@ from planner.nc.arcs import Arc
 from planner.nc.faults import Notes
 from planner.nc.program import FEED_MOVES, EventTable, Frame, Kind, Origins, Program, SplineTable
 from planner.nc.reading import AS_USUAL, Reading
-from planner.nc.state import DEGREES, State, rotary_feed
+from planner.nc.state import DEGREES, State, straight_feed
 
 _COPIED = ("kind", "feed", "line", "path_control", "tolerance")  # columns that are fields of `Program`
 
@@ -80,9 +80,8 @@ class BlockTable:
         block.end[k] = state.place
         block.feed[k] = state.feed if kind in FEED_MOVES else np.inf
         if state.others and kind == Kind.LINE:
-            moved = block.end[k] != (block.end[k - 1] if k else 0.0)
-            if moved[state.turns].any() and not moved[~state.turns].any():
-                block.feed[k] = rotary_feed(state.feed, state.feed_unit)
+            step = block.end[k] - (block.end[k - 1] if k else 0.0)
+            block.feed[k] = straight_feed(state.feed, step, state.turns, state.feed_unit, state.feeds_all)
         block.line[k] = line
         block.path_control[k] = state.path_control
         block.tolerance[k] = state.tolerance

@@ -8,11 +8,12 @@ G91, from the level before the series of cycles (R), from R (the depth) and from
     Q       depth of a peck (G73, G83)       P   dwell [s]                    I J K   offset and counterbore of G87
 
 They stay in force while the same code does. The tool goes to the hole at the height where it is if that is
-above R, else at the one it will retract to; then fast to R, makes the hole, and retracts to R (G99) or to the
-level before the series (G98), if that is higher. Between pecks it goes up by `CLEARANCE` (G73), or to R and back
-to `CLEARANCE` above the last depth.
+above R, else at the one it will retract to (on Fanuc's controls always where it is); then fast to R, makes the
+hole, and retracts to R (G99) or to the level before the series (G98), if that is higher. Between pecks it goes
+up by `CLEARANCE` (G73), or to R and back to `CLEARANCE` above the last depth. Fanuc taps by infeeds of Q.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -50,7 +51,7 @@ _STEPS = {
 }
 STEPS_MAX = 1_000_000  # of a line: more are a mistake in L or Q, and would fill the memory
 _DEEP, _BACK_BORE, _BY_HAND = 830, 870, 880  # G83, G87, G88
-_GROUP = "K of G73"  # among the words in force
+_GROUP, _INFEED = "K of G73", "Q of taps"  # among the words in force
 _SAID = {  # by code
     _BY_HAND: "the operator retracts the tool after the full stop; the plan has a rapid for it",
     codes.THREADING: "the spindle stops in its place at the bottom, and the way off the wall by Q is left out",
@@ -115,7 +116,12 @@ def steps(hole: Hole) -> Iterator[CycleStep]:
         "again": CycleStep(None, spindle=again),
         "other": CycleStep(None, spindle=other),
     }
-    for name in _STEPS[hole.code].split():
+    names = _STEPS[hole.code].split()
+    if hole.code in TAPPING and hole.peck > 0.0:
+        for k in range(1, math.ceil((hole.clear - bottom) / hole.peck - _ROUNDING)):
+            infeed = step | {"down": CycleStep(Kind.LINE, (a, b, hole.clear - k * hole.peck))}
+            yield from (infeed[name] for name in (*names, "halt"))
+    for name in names:
         if name != "dwell" or hole.dwell or hole.code not in FANUC_DWELLS:
             yield from _pecks(hole) if name == "pecks" else (step[name],)
         if name == "out" and hole.fast:
@@ -145,6 +151,7 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
         level = float(here[c]) if state.series is None else state.series.level
         # the words in force are those of a code; on Fanuc's controls those of all cycles until G80
         words = state.series.words if state.fanuc and state.series is not None else {}
+        words.pop(_INFEED, None)
         state.series = CycleSeries(state.motion, words, level)
     series = state.series
     words = _words(state, block, series)
@@ -155,7 +162,7 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
     def go(kind: Kind, place: tuple[float, float, float]) -> None:
         _to(state, table, block.line, CycleStep(kind, place))
 
-    if repeats and series.level < hole.clear - _ROUNDING:
+    if repeats and series.level < hole.clear - _ROUNDING and not state.fanuc:
         go(Kind.RAPID, (here[a], here[b], hole.clear))
         here[c] = hole.clear
     for _ in range(repeats):
@@ -164,7 +171,7 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
                 length = _length(state, block.value, axis)
                 here[axis] = length + (0.0 if state.absolute else here[axis])
         hole = replace(hole, place=(float(here[a]), float(here[b])))
-        height = float(here[c]) if here[c] > hole.clear + _ROUNDING else hole.retract
+        height = float(here[c]) if state.fanuc or here[c] > hole.clear + _ROUNDING else hole.retract
         go(Kind.RAPID, (*hole.place, height))
         go(Kind.RAPID, (*hole.place, hole.clear))
         for step in steps(hole):
@@ -179,10 +186,13 @@ def drill(state: State, table: BlockTable, block: Block, findings: Findings) -> 
 def _check_words(state: State, block: Block, words: dict[str, float], findings: Findings) -> None:
     """Raises WordFault for an impossible peck or dwell, and a spindle that does not turn as it must."""
     code, name = state.motion, f"G{codes.number(state.motion)}"
-    if code in PECKING:
-        least = min(_infeeds(words, state)[c] for c in ("peck", "least"))
-        text = f"{name} needs the depth of a peck as a Q word above 0"
-        block.require(least > 0, text, "Q" * ("Q" in block.at))
+    least = min(_infeeds(words, state)[c] for c in ("peck", "least"))
+    text = f"{name} needs the depth of a peck as a Q word above 0"
+    block.require(
+        least > 0 or (least == 0 and code in TAPPING) or code not in PECKING | TAPPING.keys(),
+        text,
+        "Q" * ("Q" in block.at),
+    )
     text = "a dwell must not be negative; write its seconds, such as P0.5"
     block.require(code not in DWELLING or words["P"] >= 0, text, "P")
     if state.fanuc and code in TAPPING.keys() | STOPPING and (code in TAPPING or not state.spindle.turning):
@@ -226,7 +236,7 @@ def _hole(state: State, block: Block, series: CycleSeries, words: dict[str, floa
 def _infeeds(words: dict[str, float], state: State) -> dict[str, float]:
     if state.motion == _DEEP and state.fanuc and "I" in words:
         return {"peck": words["I"], "less": words.get("J", 0.0), "least": words.get("K", 0.0) or words["I"]}
-    peck = words.get("Q", 0.0)
+    peck = words.get(_INFEED if state.motion in TAPPING else "Q", 0.0)
     return {"peck": peck, "least": peck}
 
 
@@ -234,7 +244,11 @@ def _repeats(state: State, block: Block, hole: Hole) -> int:
     """L. Raises WordFault for more moves than a line may make."""
     count = next((c for c in "LK" if c in block.value and (c == "L" or _counts(state, block))), "")
     repeats = integer(block, count, 0 if state.fanuc else 1) if count else 1
-    pecks = (hole.clear - hole.bottom) / hole.least if hole.code in PECKING else 0.0
+    pecks = (
+        (hole.clear - hole.bottom) / hole.least
+        if hole.code in PECKING | TAPPING.keys() and hole.least
+        else 0.0
+    )
     text = f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}"
     block.require(repeats * (_PER_HOLE + _PER_PECK * pecks) <= STEPS_MAX, text)
     return repeats
@@ -264,6 +278,11 @@ def _say(state: State, block: Block, findings: Findings) -> None:
         findings.assume(f"{name}: {text}; Fanuc would drill the hole again", block.line, block.at["K"])
     if code in _SAID:
         findings.assume(f"{name}: {_SAID[code]}", block.line, word)
+    if code in TAPPING and block.value.get("Q"):
+        findings.assume(
+            f"{name}: each infeed of Q leads out to R; a parameter of the control says whether less",
+            block.line,
+        )
     if code in TAPPING:
         text = "planned with F as its upper limit and full stops at both ends, not at constant feed"
         findings.assume(f"{name} is synchronised with the spindle: {text}", block.line)
@@ -278,6 +297,8 @@ def _words(state: State, block: Block, series: CycleSeries) -> dict[str, float]:
         if not state.fanuc and letter in codes.FANUC_WORDS.get(code, ""):
             raise block.fault(unused(letter), letter)
         series.words[letter] = block.value[letter]
+        if letter == "Q" and code in TAPPING:
+            series.words[_INFEED] = block.value["Q"]
         if letter == "K":
             series.words[_GROUP] = block.value["K"] if _groups(state, block) else 0.0
         if state.fanuc and not state.absolute:  # levels stay where they were when they were given

@@ -10,6 +10,7 @@ beside G4 follow the rule of lengths: seconds, or 0.001 s where the least increm
 """
 
 import dataclasses
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -22,10 +23,8 @@ from planner.nc import codes
 from planner.nc.lexer import Words
 
 _DWELL = 4.0
-_IN_UNITS = (
-    "X or U of a dwell without a point is read in seconds, as lengths without one are in whole units; "
-    "least_increment = 0.001 under [dialect] of the machine file makes it milliseconds"
-)
+IN_INCREMENTS = "least_increment = 0.001 under [dialect] of the machine file makes it thousandths"
+_IN_UNITS = f"X or U of a dwell without a point is read in seconds, as lengths without one are in whole units; {IN_INCREMENTS}"
 _MOTIONS = np.array([code / 10 for code, group in codes.G_GROUP.items() if group in ("motion", "cycle end")])
 _CYCLES = np.array(sorted({*codes.CYCLES, codes.THREADING})) / 10  # G76 of mills bores
 _DWELLING = {*codes.CYCLES, codes.THREADING, 40}
@@ -38,6 +37,11 @@ _OTHERS = {
     for letter, calls in (("G", (65.0, 66.0)), ("M", (97.0, 98.0, 99.0)))
 }  # fmt: skip
 LENGTHS = frozenset(ord(letter) for letter in "XYZUVWIJKRQ")
+_COORDINATES, _WHOLE, _LOOKED_AT = (
+    b"XYZUVW",
+    re.compile(r"[A-Za-z][-+]?\d+"),
+    10_000,
+)  # the first words of a program
 INCH_INCREMENT = 0.1  # the least increment in inch over that in mm, as numbers
 
 
@@ -109,6 +113,19 @@ class Integers:
         lengths = np.array([w for w in whole.tolist() if "." not in words.text(w)], dtype=np.int64)
         value[lengths] *= self.scale(words)[row[lengths]]
         return dataclasses.replace(words, value=value)
+
+
+def mixed(words: Words) -> int | None:
+    """The first coordinate without a point beside others with one, as index of its word; None where there is none:
+    a control that counts numbers without a point in least increments reads both in one program."""
+    coordinates = np.flatnonzero(np.isin(words.letter, list(_COORDINATES)) & (words.value != 0.0))[
+        :_LOOKED_AT
+    ]
+    texts = [words.text(word) for word in coordinates.tolist()]
+    whole = next(
+        (w for w, text in zip(coordinates.tolist(), texts, strict=True) if _WHOLE.fullmatch(text)), None
+    )
+    return whole if any("." in text for text in texts) else None
 
 
 def integers_of(machine: Machine | None) -> Integers:

@@ -3,9 +3,9 @@
     feed mode, F, S, T, M62-M68, M6, M61, M3-M9, M48/M49, G4, plane, units, G7/G8, G40-G42, tool length, work
     offset, path control, distance modes, G98/G99, G10/G28/G30/G52/G92, motion, M0/M1/M60/M2/M30
 
-F is read in the units in force *before* a G20 or G21 on its line. Rows that are plain straight moves run in
-`plain.py`; this file is for the others, and `mover.py` for what they move. A fault is recorded and reading
-goes on with the next line, so that `info` can show them all.
+F is read in the units in force *before* a G20 or G21 on its line (behind it on Fanuc's controls and in grbl).
+Rows that are plain straight moves run in `plain.py`; this file is for the others, and `mover.py` for what they
+move. A fault is recorded and reading goes on with the next line, so that `info` can show them all.
 """
 
 import copy
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.base.units import MM_PER_INCH, SECONDS_PER_MINUTE
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.machine import EXTRUDER, Machine
 from planner.nc import auxiliary, codes, moves, offsets
 from planner.nc.arcs import PLANES
@@ -31,7 +31,7 @@ from planner.nc.moves import Block, WordFault
 from planner.nc.plain import run_plain
 from planner.nc.printer import OF_STATE
 from planner.nc.program import FEED_MOVES, MOVES, Frame, Kind, Program
-from planner.nc.reading import ABSOLUTE, AS_USUAL, KLIPPER, Reading
+from planner.nc.reading import ABSOLUTE, AS_USUAL, AUTO, KLIPPER, Reading
 from planner.nc.set_limits import LimitsInForce, SavedStates
 from planner.nc.splines import SplineReader
 from planner.nc.state import REFUSED_MOTION, State, begins_in_inches, state_of
@@ -75,7 +75,7 @@ class Interpreter(Mover):
         self.splines = SplineReader()
         self.open_arcs: list[OpenArc] = []  # every arc that does not close
         self._dwells = DwellWords()
-        self.limits = LimitsInForce()
+        self.limits = LimitsInForce(reading.dialect)
         self.saved = SavedStates()
         self.ended = False  # M2, M30 or a second % was executed; later chunks are not
         self.archive: dict[str, Archived] = {}  # further programs of the file, by the names of their own
@@ -200,6 +200,20 @@ class Interpreter(Mover):
             at = block.feed[slow[0]] * SECONDS_PER_MINUTE
             text = f"F looks like a feed per turn of the spindle (G95), and is read per minute: {at:.6g} mm/min; {_IF_LATHE}"
             self.findings.assume(text, int(block.line[slow[0]]))
+        if self.reading.dialect == AUTO and not self.state.own_feed and not self._timed:
+            self._assume_own_speed()
+
+    def _assume_own_speed(self) -> None:
+        """Say it if x, y and z move beside rotary axes at a feed, and not at the tool centre point."""
+        state, block, used = self.state, self.table.block, slice(0, self.table.blocks)
+        if not state.turns.any() or self.tool_point.switches or state.strict or state.centres_known:
+            return
+        moves = np.diff(block.end[used], axis=0, prepend=0.0) != 0.0
+        mixed = moves[:, :3].any(axis=1) & moves[:, state.turns].any(axis=1) & (block.kind[used] == Kind.LINE)
+        if mixed.any():
+            text = "F of x, y and z that move beside rotary axes is their own speed, as LinuxCNC has it"
+            text += "; Fanuc and grbl count degrees as mm (--dialect)"
+            self.findings.assume(text, int(block.line[used][mixed.argmax()]))
 
     def _execute_or_report(self, block: Block) -> bool:
         try:
@@ -269,7 +283,7 @@ class Interpreter(Mover):
         if "plane" in g:
             state.normal, state.plane_known = PLANES[g["plane"] // 10], True
         if "units" in g:
-            state.unit = MM_PER_INCH if g["units"] == 200 else 1.0
+            state.unit = auxiliary.unit_of(g["units"])
             self._assume_units()
             self._units_known = True
         if "lathe diameter mode" in g:

@@ -158,6 +158,9 @@ class Mover:
             text = "G53 goes with absolute coordinates only; write G90 before it"
             block.require(state.absolute, text, "one-shot")
             offsets.assume_origin(state, "G53", block, self.findings)
+            if state.fanuc and state.motion == 1 and code is None:
+                text = "G53 while G1 is in force is a rapid move, as Fanuc has it (Haas moves at F); write G0 or G1 beside it"
+                self.findings.assume(text, block.line, block.at["one-shot"])
         if "H" in block.value and not state.strict and not {"H"} & (block.uses | moves.used_in_force(state)):
             self.ignored.count(OFFSET_NUMBER, f"H{block.value.pop('H'):g}", block.line)
         moves.check_words(state, block)
@@ -202,7 +205,10 @@ class Mover:
     def _straight(self, block: Block) -> None:
         state, cutter = self.state, self.cutter
         target = moves.target(state, block)
-        kind = (Kind.RAPID, Kind.LINE)[state.motion]
+        fast = state.motion == 0 or (
+            state.fanuc and block.g.get("one-shot") == 530 and "motion" not in block.g
+        )
+        kind = Kind.RAPID if fast else Kind.LINE
         surface = kind == Kind.LINE and auxiliary.on_surface(state)
         if kind == Kind.LINE:
             auxiliary.check_feed(state, block)
@@ -253,7 +259,8 @@ class Mover:
                 centre = float((arc.centre - state.position)[0]) + state.programmed()[0]
                 size = moves.arc_radius(state.position, arc, normal) if normal != 0 else 0.0
                 state.feed = auxiliary.surface_feed(state, abs(centre) + size, block.motion_word())
-            auxiliary.feed_of_time(state, block, length, self.findings)
+            timed = moves.arc_radius(state.position, arc, normal) if state.fanuc else length
+            auxiliary.feed_of_time(state, block, timed, self.findings)
             if self.cutter is not None:
                 self.cutter.arc(target, arc, block.line)
         finally:

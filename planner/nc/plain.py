@@ -13,13 +13,13 @@ import numpy as np
 
 from planner.base.arrays import Array
 from planner.base.kernels import njit
-from planner.base.units import RAD_PER_DEG, SECONDS_PER_MINUTE
+from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import LEFT_OUT, PARKED, REFUSED, IgnoredWords
 from planner.nc.lexer import Words
 from planner.nc.moves import NUMBER_MAX
 from planner.nc.program import Kind
-from planner.nc.state import State
+from planner.nc.state import State, straight_feed
 
 # Letters by their codes.
 _F, _G, _N, _O, _S = 70, 71, 78, 79, 83
@@ -35,7 +35,8 @@ def run_plain(words: Words, row: int, state: State, table: BlockTable, ignored: 
     for letter in state.wrapped if state.absolute else "":
         wrapped[state.letters.index(letter)] = True
     path = state.feed_factor, int(state.path_control), state.tolerance, state.offset
-    fixed = state.absolute, state.unit, *path, _axes(state.letters), state.scale, state.turns, wrapped
+    axes = _axes(state.letters), state.scale, state.turns, wrapped, state.feeds_all
+    fixed = state.absolute, state.unit, *path, *axes
     events = table.events
     begin = row, table.blocks, events, table.refusals, state.motion, state.feed, state.feed_unit
     others = ignored.treatment, ignored.parked
@@ -63,15 +64,16 @@ def _run(rows, begin, fixed, position, block, event, refused_word, others):  # p
     rows   : the fields of `Words` that the loop reads
     begin  : state that plain rows change: how far they are read and stored, modal motion and feed
     fixed  : that they do not; `axis_of` (256,) by letter, `scale` (A,) mm or degrees per programmed unit, `wrapped`
-             (A,) where coordinates are absolute
+             (A,) where coordinates are absolute, `feeds_all` of `State`
     others : of `IgnoredWords`; sets where axes are parked
     """
     letter, value, line, first, frame = rows
-    absolute, unit, feed_factor, path_control, tolerance, offset, axis_of, scale, turns, wrapped = fixed
+    absolute, unit, feed_factor, path_control, tolerance, offset = fixed[:6]
+    axis_of, scale, turns, wrapped, together = fixed[6:]
     treatment, parked = others
     row, blocks, events, refusals, motion, feed, feed_unit = begin
     axes = len(position)
-    given = np.empty(axes)
+    given, way = np.empty(axes), np.empty(axes)
     while row < len(line):
         code, new_feed, speed, moves, is_plain = -1, -1.0, -1.0, False, True
         for axis in range(axes):
@@ -120,20 +122,17 @@ def _run(rows, begin, fixed, position, block, event, refused_word, others):  # p
             event.letter[events], event.value[events] = _S, speed
             events += 1
         if moves:
-            goes = turned = False  # linear axes, rotary axes
             for axis in range(axes):
                 before = position[axis]
                 if not np.isnan(given[axis]):
                     step = given[axis] * scale[axis]
                     position[axis] = step + (offset[axis] if absolute else before)
-                if position[axis] != before:
-                    goes |= not turns[axis]
-                    turned |= turns[axis]
+                way[axis] = position[axis] - before
                 block.end[blocks, axis] = position[axis]
             block.kind[blocks] = _LINE if motion == 1 else _RAPID
-            block.feed[blocks] = feed if motion == 1 else np.inf
-            if motion == 1 and turned and not goes:
-                block.feed[blocks] = feed / feed_unit * RAD_PER_DEG
+            block.feed[blocks] = np.inf
+            if motion == 1:
+                block.feed[blocks] = straight_feed(feed, way, turns, feed_unit, together)
             block.line[blocks] = line[row]
             block.path_control[blocks] = path_control
             block.tolerance[blocks] = tolerance

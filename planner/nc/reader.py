@@ -17,7 +17,7 @@ from planner.machine import EXTRUDER, Machine, load_machine
 from planner.nc.capped import capped
 from planner.nc.extruder import with_extruder
 from planner.nc.faults import Fault, require_none
-from planner.nc.integers import integers_of
+from planner.nc.integers import IN_INCREMENTS, integers_of, mixed
 from planner.nc.interpreter import Interpreter
 from planner.nc.language import detect
 from planner.nc.lexer import Words, split_words, text_alone
@@ -31,11 +31,12 @@ from planner.nc.reading import (
     AUTO,
     CL,
     FANUC,
+    GRBL,
     HEIDENHAIN,
     KLIPPER,
     LATHE,
     LINUXCNC,
-    PRINTER,
+    PRINTERS,
     SIEMENS,
     Reading,
 )
@@ -177,7 +178,7 @@ def execute(
     if automatic:
         mark = "its %_N_" if interpreter.archive else detect.siemens_mark(words, source)
     siemens, first_line = bool(mark) or language == SIEMENS, int(words.line[0])
-    prints = (called is not None and called.dialect == KLIPPER) or language == PRINTER
+    prints = (called is not None and called.dialect == KLIPPER) or language in PRINTERS
     if not siemens and not reading.strict:
         extruder = automatic and machine is not None and EXTRUDER in machine.axes
         prints |= is_printer(words, extruder=extruder)
@@ -200,10 +201,15 @@ def execute(
         findings.assume(text, first_line, grave=True)
     of_fanuc = FANUC in (reading.dialect, dialect) or dialect == LATHE
     state.fanuc = of_fanuc or detect.is_fanuc(words, dialect, reading)
+    state.own_feed = state.fanuc or reading.dialect == GRBL
     state.centres_known = siemens
     state.plane_known = not state.fanuc or dialect == LATHE
     state.seconds_meant = not automatic or siemens or state.fanuc
-    words = integers_of(machine).applied(words)
+    integers = integers_of(machine)
+    if state.fanuc and integers.increment is None and (whole := mixed(words)) is not None:
+        text = f"{words.text(whole)} without a point beside coordinates with one is in whole units; {IN_INCREMENTS}"
+        findings.assume(text, int(words.line[words.row(whole)]))
+    words = integers.applied(words)
     if dialect is not None:
         interpreter.ignored.refuse_extruder()
         from planner.nc.language.expand import expand

@@ -40,6 +40,7 @@ from planner.nc.faults import Findings
 from planner.nc.moves import WordFault
 from planner.nc.printer import OFFSET, PLACE, RESTORE, SAVE
 from planner.nc.program import MOVES, Kind, SetLimit
+from planner.nc.reading import MARLIN, REPRAP
 from planner.nc.settings import CORNERS, GRBL, PRINTER_FEED, SMOOTHNESS, VELOCITY_LIMIT, Setting
 from planner.nc.state import State
 
@@ -56,9 +57,13 @@ _Kept = tuple[State, FloatArray]  # what SAVE_GCODE_STATE and G60 keep, with the
 
 
 class LimitsInForce:
-    """The limits in force, and of those that were so on a move the lowest."""
+    """The limits in force, and of those that were so on a move the lowest.
 
-    def __init__(self) -> None:
+    dialect : as `Reading.dialect`, which tells the unit of M203
+    """
+
+    def __init__(self, dialect: str) -> None:
+        self._dialect = dialect
         self.factors: list[tuple[int, float]] = []  # by which F counts from a row on, as M220 sets them
         self._now: dict[tuple[str, str], float] = {}
         self._seen: list[dict[tuple[str, str], float]] = []  # on moves
@@ -129,9 +134,13 @@ class LimitsInForce:
         self, name: str, given: Mapping[str, float], unit: float, line: int, findings: Findings
     ) -> None:
         if name == SPEEDS:
-            per_minute = max(given.values(), default=0.0) >= PER_MINUTE
+            known = self._dialect in (MARLIN, REPRAP)
+            per_minute = self._dialect == REPRAP or (
+                not known and max(given.values(), default=0.0) >= PER_MINUTE
+            )
             unit_of = "minute, as RepRapFirmware has them" if per_minute else "second, as Marlin has them"
-            findings.assume(f"speeds of {SPEEDS} are read per {unit_of}", line)
+            if not known:
+                findings.assume(f"speeds of {SPEEDS} are read per {unit_of}", line)
             self._set("velocity", given, unit, SECONDS_PER_MINUTE if per_minute else 1.0)
         elif name in ACCELERATIONS:
             self._set("acceleration", given, unit)

@@ -18,7 +18,8 @@ from typing import Any, Literal
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
-from planner.base.units import MM_PER_INCH, RAD_PER_DEG
+from planner.base.kernels import njit
+from planner.base.units import MM_PER_INCH, RAD_PER_DEG, SECONDS_PER_MINUTE
 from planner.machine import Machine
 from planner.nc.program import PathControl
 
@@ -41,9 +42,28 @@ def _turns(letters: str) -> Array:
     return np.array([letter in DEGREES for letter in letters])
 
 
-def rotary_feed(feed: float, unit: float) -> float:
-    """Feed [rad/s] of a block of rotary axes alone, by that in force [mm/s] and mm per programmed unit."""
-    return feed / unit * RAD_PER_DEG
+@njit(cache=True)
+def straight_feed(feed, step, turns, unit, together):
+    """`Program.feed` of a straight move [mm/s; rad/s where only rotary axes move].
+
+    feed     : F in force [mm/s]
+    step     : (A,) the move [mm; degrees]
+    turns    : (A,) True for rotary axes
+    unit     : mm per programmed unit of length when F was given
+    together : F is the speed of all axes, a degree counting as a unit of length
+    """
+    first, further, turned = 0.0, 0.0, 0.0
+    for axis in range(len(step)):
+        if turns[axis]:
+            turned += (step[axis] * unit) ** 2
+        elif axis < 3:
+            first += step[axis] ** 2
+        else:
+            further += step[axis] ** 2
+    goes = first if first > 0.0 else further
+    if goes == 0.0 and turned > 0.0:
+        return feed / unit * RAD_PER_DEG
+    return feed * math.sqrt(goes / (first + further + turned)) if together and goes > 0.0 else feed
 
 
 @dataclass(frozen=True)
@@ -148,6 +168,9 @@ class State:
     in_thread: bool = False  # the last block was cut in step with the spindle
     strict: bool = False  # nothing is assumed (`Reading.strict`)
     fanuc: bool = False  # G10 L2 and L20 are those of Fanuc and Haas, dwells are in milliseconds
+    # F is the speed of all axes together, degrees counting as units of length, in the unit of its own line: Fanuc, grbl
+    own_feed: bool = False
+    at_tip: bool = False  # the tool centre point is on
     entering: bool = False  # lines up to G11 are data of the control (G10 L50)
     seconds_meant: bool = False  # the unit of dwells is known
     centres_known: bool = False  # the dialect has no G90.1
@@ -176,6 +199,21 @@ class State:
     def place(self) -> FloatArray:
         """(A,) where the tool is [mm]."""
         return self.position if self.actual is None else self.actual
+
+    @property
+    def feeds_all(self) -> bool:
+        """True if F counts so in the mode in force."""
+        return self.own_feed and not self.at_tip and self.feed_mode != "inverse time"
+
+    @property
+    def word_feed(self) -> float:
+        """F in force as a program writes it now, per minute or per turn; 0 for none."""
+        feed = (
+            self.feed_per_turn
+            if self.feed_mode == "per turn"
+            else self.feed / self.feed_factor * SECONDS_PER_MINUTE
+        )
+        return feed / self.unit
 
     @property
     def is_plain(self) -> bool:

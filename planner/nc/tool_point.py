@@ -69,6 +69,7 @@ class ToolPointSwitch:
         if now and state.tool_offset[:2].any():
             text = "the tool centre point needs a tool on the spindle's axis; this has an offset in x or y"
             raise block.fault(text, "tool point" if block.tool_point is not None else "tool length")
+        state.at_tip = bool(now)
         if now != self.on or (now and length != self.switches[-1].length):
             self._move(state, now, length)
             self.switches.append(Switch(table.blocks, block.line, now, length))

@@ -1,7 +1,7 @@
 """Writing a program back with other feeds: F words are put in or replaced, every other byte stays as it is.
 
-An F word is written where a block's feed is not the one in force, in the units in force before its line,
-since F acts before a G20 or G21 beside it. A block that keeps its programmed feed keeps the source's word, or
+An F word is written where a block's feed is not the one in force, in the units that F has there: those before a
+G20 or G21 beside it, or behind, as the program was read. A block that keeps its programmed feed keeps the source's word, or
 gets it written out where one of ours is in force. Lines under G93 and G95, threads, and F words without a
 feed move stay. A block of rotary axes can be given under G93 instead, by how often it could be run in a
 minute; the next other one has G94 and its feed.
@@ -20,6 +20,7 @@ numbers and comments are left out. Numbers are rounded to `DECIMALS`.
 
 import math
 import re
+from collections.abc import Sequence
 from functools import cache
 from pathlib import PurePath
 from typing import NamedTuple
@@ -43,6 +44,7 @@ SAME_FEED = 1e-6  # a feed within this share of the programmed one is that [-]: 
 G93, G94, G95 = 93, 94, 95
 _F, _G = ord("F"), ord("G")
 DWELL, _SECONDS = 4.0, frozenset(b"XU")
+_PERCENT = 220.0  # M code
 _NUMBER = re.compile(NUMBER)
 STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
@@ -75,18 +77,25 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
     reading = program.reading
     source = reading.kept(source, program.source)[0]
     words = split_words(without_leader(source, reading)[0], block_delete=reading.block_delete)
-    in_source, line = _SourceRows(words), program.line[moving]
+    line = program.line[moving]
     row = np.searchsorted(words.line, line)
     if len(line) and (row[-1] >= len(words.line) or (words.line[row] != line).any()):
         raise ValueError("retimed: the program has blocks on lines where the source has no word")
+    asked = (program.uncapped if len(program.uncapped) else program.feed)[moving] * SECONDS_PER_MINUTE
+
+    def off(rows: _SourceRows) -> Array:
+        feed = rows.feed[row] * rows.unit[row]  # [mm per minute]
+        wrong: Array = ~(np.abs(asked - feed) <= SAME_FEED * feed)
+        return wrong
+
+    in_source = min(
+        (_SourceRows(words, behind=behind) for behind in (False, True)), key=lambda rows: off(rows).sum()
+    )
     programmed, per_minute = in_source.feed[row], in_source.mode[row] == G94
     often = np.full(len(moving), np.nan) if inverse is None else np.asarray(inverse, dtype=np.float64)[moving]
     often[~per_minute | (in_source.mode_word[row] >= 0)] = np.nan
-    # [mm per minute]; not that of a move under G93 and G95, and in a thread
-    f_word_feed = programmed * in_source.unit[row]
-    asked = program.uncapped if len(program.uncapped) else program.feed
-    off = np.abs(asked[moving] * SECONDS_PER_MINUTE - f_word_feed)
-    changeable = (per_minute & (off <= SAME_FEED * f_word_feed)) | ~np.isnan(often)
+    # F is not that of a move under G93 and G95, and in a thread
+    changeable = (per_minute & ~off(in_source)) | ~np.isnan(often)
     moving, row, programmed, often = (column[changeable] for column in (moving, row, programmed, often))
     wanted = np.maximum(new_feed[moving], FEED_MIN) * SECONDS_PER_MINUTE / in_source.unit[row]
 
@@ -108,16 +117,19 @@ def retimed(source: bytes, program: Program, feeds: FloatArray, inverse: FloatAr
 
 
 class _SourceRows:
-    """Units, F words and feed modes on the R rows of the source."""
+    """Units, F words and feed modes on the R rows of the source.
 
-    def __init__(self, words: Words):
+    behind : F is read in the unit of a G20 or G21 beside it, as on Fanuc's controls and in grbl
+    """
+
+    def __init__(self, words: Words, *, behind: bool):
         rows = np.arange(len(words.line))
         of_word = np.repeat(rows, np.diff(words.first))
         code = np.where(words.letter == _G, np.rint(words.value * 10.0), -1.0)
         switch = np.flatnonzero(np.isin(code, (200.0, 210.0)))
         unit = np.append(1.0, np.where(code[switch] == 200.0, MM_PER_INCH, 1.0))
-        # (R,) length unit in force before the row [mm]: what its F word is read in
-        self.unit = unit[np.searchsorted(of_word[switch], rows)]
+        # (R,) length unit in force before the row [mm], or behind it: what its F word is read in
+        self.unit = unit[np.searchsorted(of_word[switch], rows, side="right" if behind else "left")]
         # (R,) index of its F word, and of its word for the feed mode, or -1
         self.f_word, self.mode_word = np.full((2, len(rows)), -1)
         given = np.flatnonzero(words.letter == _F)
@@ -260,10 +272,13 @@ def _arc(program: Program, row: int, position: FloatArray, end: FloatArray) -> s
 
 class _Flat:
     """Collects the lines of a program while it is expanded. With `points` lengths and the times of dwells are
-    written with a point, because the machine reads them otherwise without."""
+    written with a point, because the machine reads them otherwise without. The percent of F that a Sinumerik's
+    program sets (OVR, here M220) is in the F words: other controls have no such code."""
 
     def __init__(self, source: str, points: bool):
         self.points, self._dwells = points, DwellWords()
+        # share of F; F in force, 0 for none; whether G93 is
+        self._share, self._feed, self._inverse = 1.0, 0.0, False
         head = f"{in_comment(source)}, expanded by feedrate-planner: parameters, loops and calls written out"
         self.lines = [f"({head})"]
 
@@ -274,7 +289,7 @@ class _Flat:
         dwells = set(self._dwells.find(words)) if self.points else set()
         for row in range(len(first) - 1):
             line = []
-            mine = range(first[row], first[row + 1])
+            mine = self._counted(range(first[row], first[row + 1]), letters, values)
             waits = any(letters[w] == _G and values[w] == DWELL for w in mine)
             for w in mine:
                 if letters[w] not in _LEFT_OUT:
@@ -285,6 +300,22 @@ class _Flat:
                     line.append(("P" if seconds else chr(letters[w])) + number + "." * with_point)
             if line:
                 self.lines.append(" ".join(line))
+
+    def _counted(self, row: range, letters: list[int], values: list[float]) -> Sequence[int]:
+        """The words of a row to write, with the share of F in the values; of M220 F, if one is in force."""
+        for w in row:
+            if letters[w] == _G and values[w] in (G93, G94, G95):
+                self._feed, self._inverse = 0.0, values[w] == G93
+        percent = next((values[w] for w in row if letters[w] == ord("S")), 0.0)
+        if percent and any(letters[w] == ord("M") and values[w] == _PERCENT for w in row):
+            self._share = percent / 100.0
+            letters[row[0]], values[row[0]] = _F, self._feed * self._share
+            return row[:1] if self._feed else ()
+        for w in row:
+            if letters[w] == _F:
+                self._feed = 0.0 if self._inverse else values[w]
+                values[w] *= self._share
+        return row
 
     def text(self) -> str:
         """The program, with M2 at its end if it has no end of its own."""

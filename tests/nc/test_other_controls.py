@@ -209,7 +209,7 @@ def test_commands_are_left_out_by_name() -> None:
 
 @pytest.mark.parametrize(
     ("name", "means"),
-    [("haas", "fanuc"), ("grbl", "linuxcnc"), ("sinumerik", "siemens"), ("klipper", "printer")],
+    [("haas", "fanuc"), ("sinumerik", "siemens"), ("klipper", "printer")],
 )
 def test_controls_have_the_dialect_of_another(name: str, means: str) -> None:
     assert Reading(dialect=name) == Reading(dialect=means)

@@ -196,7 +196,7 @@ def test_home_through_a_point() -> None:
 
 
 def test_feed_is_read_before_units() -> None:
-    program = parse_program("G21 G1 X1 F60\nG20 F120 G1 X1\nX2 F60")
+    program = parse_program("G21 G1 X1 F60\nG20 F120 G1 X1\nX2 F60", reading=Reading(dialect="linuxcnc"))
     assert program.feed.tolist() == [1.0, 2.0, 25.4]
     assert program.notes == ("line 2: F120 is mm per minute: F acts before G20 on the same line",)
 

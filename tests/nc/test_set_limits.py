@@ -14,6 +14,7 @@ from planner.base.errors import InputError
 from planner.machine import Machine
 from planner.nc.program import SetLimit
 from planner.nc.reader import parse_program
+from planner.nc.reading import Reading
 from planner.nc.set_limits import limited
 from planner.report.export import write_plan
 
@@ -199,3 +200,13 @@ def test_what_is_no_limit_is_refused(text: str) -> None:
         return
     with pytest.raises(InputError):
         parse_program(f"G21 F60\n{text}\nG1 X1")
+
+
+@pytest.mark.parametrize("speed", [600, 3000])
+def test_the_dialect_says_what_m203_is_in(speed: int) -> None:
+    """Marlin has it in mm/s, RepRapFirmware in mm/min."""
+    text = f"M203 X{speed}\nG1 X10 F6000\n"
+    for dialect, per in (("marlin", 1), ("reprapfirmware", 60), ("printer", 1 if speed < 1000 else 60)):
+        program = parse_program(text, reading=Reading(dialect=dialect))
+        assert [limit.value for limit in program.limits] == pytest.approx([speed / per])
+        assert any("M203" in note for note in program.assumptions) == (dialect == "printer")

@@ -17,11 +17,11 @@ import numpy as np
 from planner.base.errors import InputError
 from planner.base.units import RAD_PER_DEG
 from planner.machine import Machine, Plotter
-from planner.nc.arcs import Arc
+from planner.nc.arcs import Arc, arc_through
 from planner.nc.block_table import BlockTable
 from planner.nc.faults import Fault, Notes
 from planner.nc.hpgl import instructions as written
-from planner.nc.hpgl.drawing import NotDrawn, Point, Scaling, circle_through
+from planner.nc.hpgl.drawing import NotDrawn, Point, Scaling
 from planner.nc.hpgl.instructions import FORMS, IGNORED, Instruction
 from planner.nc.program import Kind, Program
 from planner.nc.reading import AS_USUAL, Reading
@@ -183,11 +183,11 @@ class _Run:
         self.scaling.handedness()
         through = self._point(*it.numbers[:2], absolute=it.name == "AT")
         end = self._point(*it.numbers[2:4], absolute=it.name == "AT")
-        found = circle_through(self.position, through, end)
+        found = arc_through(complex(*self.position), complex(*through), complex(*end))
         if found is None:
             self._go(end, it.at)
         else:
-            self._turn(*found, end, it.at)
+            self._turn((found[0].real, found[0].imag), found[1], end, it.at)
 
     def _circle(self, it: Instruction) -> None:
         radius, at = it.numbers[0], it.at

@@ -20,7 +20,7 @@ from planner.base.arrays import FloatArray
 from planner.nc.arcs import FULL_TURN, IN_PLANE, Arc, at_place, in_plane
 from planner.nc.block_table import BlockTable
 from planner.nc.cutter import Cutter, CutterFault, OffsetMove, dot, meeting
-from planner.nc.language.rows import AXES, STANDS, STOPS, G, M, Move, TravelRow, arc_words, require
+from planner.nc.language.rows import AXES, STANDS, STOPS, F, G, M, Move, TravelRow, arc_words, require
 from planner.nc.program import Kind
 from planner.nc.state import State
 
@@ -159,6 +159,7 @@ class CornerMove:
     size: float  # R, or the number of the chamfer [mm]
     line: int  # where it stands
     modal: bool = False  # of all moves: none where it has no room, such as before a move along the tool axis
+    feed: float | None = None  # F of its own; behind it that before holds again
     first: Move | None = None
 
     def joined(self, second: Move, normal: int) -> tuple[list[Move], Move]:
@@ -198,7 +199,8 @@ class CornerMove:
         plane = IN_PLANE[normal]
         one = _cut(first, first.begin, at_place(start, first.end, normal), normal)
         two = _cut(second, at_place(end, second.begin, normal), second.end, normal)
-        rest = TravelRow([], first.rest.line, first.rest.frame)
+        own = [] if self.feed is None else [(F, self.feed, first.at)]
+        rest = TravelRow(own, first.rest.line, first.rest.frame)
         return [one, Move(rest, first.at, 1, one.end, two.begin, plane, arc)], two
 
 

@@ -16,7 +16,7 @@ from planner.machine import Machine
 from planner.nc.hpgl.instructions import CONTROL
 from planner.nc.lexer import FAULT, Words, split_words
 from planner.nc.printer import is_command
-from planner.nc.reading import AUTO, FANUC, HEIDENHAIN, LINUXCNC, PRINTER, Reading
+from planner.nc.reading import AUTO, FANUC, GRBL, HEIDENHAIN, LINUXCNC, PRINTERS, Reading
 from planner.nc.unreadable import LOOKED_AT
 
 # What is repeated below is possessive (*+) or atomic ((?>...)): a text can be read in one way only. Else one
@@ -227,8 +227,8 @@ def dialect_of(words: Words, reading: Reading, *, prints: bool = False) -> str |
         not_read = prints or left_out or reading.strict or reading.dialect not in (AUTO, FANUC)
         if not computes(text) or of_printer or (only and not_read):
             continue
-        if reading.dialect not in (AUTO, PRINTER):
-            return reading.dialect
+        if reading.dialect not in (AUTO, *PRINTERS):
+            return LINUXCNC if reading.dialect == GRBL else reading.dialect
         if _LINUXCNC.search(text):
             return LINUXCNC
         if _FANUC.search(text) or only:

@@ -11,6 +11,7 @@ _SIGNS = {"EQ": "==", "NE": "!=", "GT": ">", "GE": ">=", "LT": "<", "LE": "<="}
 COMPARISONS = frozenset(_SIGNS)
 # Of finite numbers these may make one that is not: a computed value of none would count as a word without value.
 GROWING = frozenset(("+", "-", "*", "/", "POT", "LEN"))
+_TWELVE_DIGITS = 1e-12  # relative
 LOGICAL = frozenset(("AND", "OR", "XOR", "NOT"))
 # By name and number of operands. A dialect that means another thing by a name puts its own text in the place
 # of this one.
@@ -67,6 +68,11 @@ def rounded(x: float) -> float:
     return float(math.trunc(x + (0.5 if x >= 0 else -0.5)))
 
 
+def equal(a: float, b: float) -> bool:
+    """Whether numbers are the same to twelve digits."""
+    return abs(a - b) <= _TWELVE_DIGITS * max(abs(a), abs(b))
+
+
 def array_index(index: float, size: float) -> float:
     """The index of an array's value. Raises ValueError for none of its values."""
     if not 0 <= round(index) < size:
@@ -76,6 +82,7 @@ def array_index(index: float, size: float) -> float:
 
 FUNCTIONS: dict[str, Callable[..., object]] = {
     "array_index": array_index,
+    "equal": equal,
     "remainder": math.remainder,
     **{f.__name__: f for f in (math.exp, math.log, math.log10, math.sqrt, math.hypot, math.trunc, math.fmod)},
     **{f.__name__: f for f in (math.ceil, math.floor, math.copysign, finite, modulo, rounded)},

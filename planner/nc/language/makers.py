@@ -10,6 +10,7 @@ their order, which is not documented, is refused. A shift alone becomes a G52; e
 the coordinates of the work system (`travel`).
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from functools import partial
 
@@ -17,10 +18,11 @@ import numpy as np
 
 from planner.base.arrays import FloatArray
 from planner.base.units import SECONDS_PER_MINUTE
+from planner.nc import arcs
 from planner.nc.arcs import IN_PLANE, at_place, in_plane
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.making import TAPPED, Given, Maker, Making, Row, around
-from planner.nc.language.rows import STANDS, TravelRow, require, turned
+from planner.nc.language.rows import STANDS, F, TravelRow, require, turned
 from planner.nc.language.travel import FRAME_CHANGES, ContourWay
 from planner.nc.language.tree import Expression, MadeRows, SourcePlace, made
 from planner.nc.program import Kind
@@ -29,7 +31,6 @@ AXES = "XYZ"
 FRAMES = ("TRANS", "ROT", "SCALE", "MIRROR")  # of Siemens, with A before them where they add
 _G63 = 63.0
 _FLAT = 1e-9  # relative, below which three points are on a line
-_F = ord("F")
 
 
 def siemens_frame(making: Making, given: Given, *, name: str) -> Iterator[Row]:
@@ -131,20 +132,24 @@ def depart(making: Making, given: Given, *, kind: str) -> None:
 
 def _way(making: Making, given: Given, name: str, kind: str) -> ContourWay:
     scale = making.travel.scale()
-    words = [(_F, given["F"], making.place.at)] if "F" in given else []
+    words = [(F, given["F"], making.place.at)] if "F" in given else []
     row, angle = TravelRow(words, making.place.line, making.frame), given.get("CCA", 0.0)
     length, radius = (given.get(word, 0.0) * making.unit * scale for word in ("LEN", "R"))
     return ContourWay(name, kind, row, making.place.at, length, radius, angle)
 
 
-def corner(place: SourcePlace, kind: str, size: Expression, *, modal: bool = False) -> MadeRows:
-    """The statement of a rounding or chamfer (corner_moves.KINDS) at the end of the next move."""
-    return made(place, partial(_corner, kind=kind, modal=modal), size=size)
+def corner(
+    place: SourcePlace, kind: str, size: Expression, *, modal: bool = False, feed: Expression | None = None
+) -> MadeRows:
+    """The statement of a rounding or chamfer (corner_moves.KINDS) at the end of the next move, with its `feed`."""
+    fed = {} if feed is None else {"F": feed}
+    return made(place, partial(_corner, kind=kind, modal=modal), size=size, **fed)
 
 
 def _corner(making: Making, given: Given, *, kind: str, modal: bool) -> None:
     require(given["size"] >= 0.0, "a rounding or chamfer is not negative")
-    making.travel.corner(kind, given["size"] * making.unit, making.place.line, modal=modal)
+    size, feed = given["size"] * making.unit, given.get("F")
+    making.travel.corner(kind, size, making.place.line, modal=modal, feed=feed)
 
 
 def _direction(making: Making) -> complex:
@@ -186,6 +191,7 @@ def _arc(making: Making, given: Given, centre: complex, left: bool) -> list[Row]
     to = at_place(centre, here, normal) - here
     row: Row = [("G", 3.0 if left else 2.0), *((letter, given[letter]) for letter in "F" if letter in given)]
     row += [(letter, given.get(letter, float(at))) for letter, at in zip(AXES, here, strict=True)]
+    row = [(letter, value * (making.per_radius if letter == "X" else 1.0)) for letter, value in row]
     row += [("IJK"[a], float(to[a])) for a in IN_PLANE[normal]]
     return [row] if making.absolute else [[("G", 90.0)], row, [("G", 91.0)]]
 
@@ -199,7 +205,7 @@ def _in_its_plane(making: Making, given: Given, behind: str = "") -> complex:
 
 def tangent_arc(making: Making, given: Given) -> Iterable[Row]:
     """CT: the arc to X Y Z that goes on in the direction of the last move. Raises ValueError."""
-    normal = making.interpreter.state.normal
+    normal, given = making.interpreter.state.normal, making.as_radii(given)
     left, here = 1j * _direction(making), in_plane(np.array(making.here()), normal)
     way = _in_its_plane(making, given) - here
     along = 2.0 * (way.conjugate() * left).real
@@ -211,17 +217,16 @@ def tangent_arc(making: Making, given: Given) -> Iterable[Row]:
 
 def arc_through(making: Making, given: Given) -> Iterable[Row]:
     """CIP: the arc to X Y Z through X1 Y1 Z1. Raises ValueError."""
-    axis = AXES[making.interpreter.state.normal]
+    axis, given = AXES[making.interpreter.state.normal], making.as_radii(given)
     level = making.here()[AXES.index(axis)]
     if any(abs(given.get(letter, level) - level) > _FLAT for letter in (axis, axis + "1")):
         raise ValueError("a CIP out of its plane (G17, G18, G19) is not read; write it with lines")
-    a = in_plane(np.array(making.here()), making.interpreter.state.normal)
-    u, w = _in_its_plane(making, given, "1") - a, _in_its_plane(making, given) - a
-    turn = (u.conjugate() * w).imag
-    if abs(turn) <= _FLAT * max(abs(u), abs(w)) ** 2:
+    here = in_plane(np.array(making.here()), making.interpreter.state.normal)
+    end = _in_its_plane(making, given)
+    found = arcs.arc_through(here, _in_its_plane(making, given, "1"), end)
+    if found is None or end == here:
         raise ValueError("the three points of CIP lie on a line: that is no arc; write G1")
-    centre = a + (abs(u) ** 2 * w - abs(w) ** 2 * u) * 1j / (2.0 * turn) * -1.0
-    return _arc(making, given, centre, turn > 0)
+    return _arc(making, given, found[0], found[1] > 0)
 
 
 def dwell_turns(making: Making, given: Given) -> list[Row]:
@@ -235,7 +240,7 @@ def tap_path(making: Making, given: Given, *, code: float) -> Iterator[Row]:
     """G331 and G332, in and out at lead times speed, and G63, at F: a straight move between full stops."""
     state = making.interpreter.state
     speed = given.get("S", state.spindle.speed)
-    feed = given.get("F", state.feed * SECONDS_PER_MINUTE / making.unit)
+    feed = given.get("F", state.word_feed)
     if code != _G63:
         feed = abs(given["lead"]) * speed
     require(feed > 0.0, "tapping by G331 needs the lead (K) and the speed S, G63 its F")
@@ -244,6 +249,17 @@ def tap_path(making: Making, given: Given, *, code: float) -> Iterator[Row]:
     stop: Row = [("G", 4.0), ("P", 0.0)]
     turn: list[Row] = [[("S", speed)]] if "S" in given else []
     return around(making, [*turn, stop, [("G", 1.0), ("F", feed), *ends], stop], feed=True)
+
+
+def threaded(making: Making, given: Given) -> list[Row]:
+    """G33 to absolute X, Y, Z, its lead K along the axis that moves most, as on Fanuc's controls and a Sinumerik: the
+    pitch of LinuxCNC's G33 is along the cut."""
+    to, here = making.as_radii(given), zip(AXES, making.here(), strict=True)
+    ways = [to[axis] - at for axis, at in here if axis in to]
+    longest = max(map(abs, ways), default=0.0)
+    pitch = given["K"] * (math.hypot(*ways) / longest if longest else 1.0)
+    row: Row = [("G", 33.0), *((axis, given[axis]) for axis in AXES if axis in given), ("K", pitch)]
+    return [row] if making.absolute else [[("G", 90.0)], row, [("G", 91.0)]]
 
 
 def refuse(message: str) -> Maker:

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from planner.base.units import SECONDS_PER_MINUTE
 from planner.nc.interpreter import Interpreter
 from planner.nc.language.rows import TravelRow, require
 from planner.nc.language.travel import Travel
@@ -26,7 +25,7 @@ ASSUMED = {
     "spindle position": "positioning the spindle (SPOS) takes no time in this plan",
     "preset": "the datum of cycle 247 is that of the work offset in force: the preset table is the control's",
     "retraction": "MB MAX leads to machine zero in z: where its travel ends the control knows",
-    "feed of corners": "F of RND and CHF is not followed: they are cut at F of the path",
+    "feed of linear axes": "F of X, Y and Z that move beside rotary axes is their own speed",
     "waits": "waits for other channels and spindles (WAITM, WAITS) take no time",
     "tool offset": "offsets of tools (D) are not added: z is that of the tool's tip",
     "tool centre feed": "F holds for the tool's centre (CFTCP); CFC and CFIN, the control's default, have it on the contour of arcs",
@@ -99,6 +98,15 @@ class Making:
         x, y, z = self.travel.position() / self.unit
         return float(x), float(y), float(z)
 
+    @property
+    def per_radius(self) -> float:
+        """X words per radius: 2 where they are diameters, else 1."""
+        return 2.0 if self.interpreter.state.diameters else 1.0
+
+    def as_radii(self, given: Given) -> Given:
+        """The values with those of X as radii."""
+        return {c: value / self.per_radius if c[0] == "X" else value for c, value in given.items()}
+
     def tool_radius(self) -> float:
         """Radius of the loaded tool in the program's unit. Raises ValueError where it is not known."""
         found = self.travel.radius()
@@ -115,8 +123,8 @@ class Making:
 def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
     """The rows of a cycle under G90, then G91, the motion code and with `feed` the feed as before."""
     state, travel, absolute = making.interpreter.state, making.travel, making.absolute
+    before = state.word_feed
     motion = travel.motion if travel.active else state.motion
-    before = state.feed * SECONDS_PER_MINUTE / making.unit if state.feed_mode == "per minute" else 0.0
     if not absolute:
         yield [("G", 90.0)]
         making.flush()
@@ -126,7 +134,7 @@ def around(making: Making, rows: Iterable[Row], *, feed: bool) -> Iterator[Row]:
         yield [("G", 91.0)]
     if motion in (0, 1) and motion != state.motion:
         yield [("G", float(motion))]
-    if feed and before > 0.0:
+    if feed and state.feed_mode == "per minute" and before > 0.0:
         yield [("F", before)]
 
 
@@ -234,6 +242,8 @@ class Pecks:
     chip   : depth between two such retracts within an infeed, 0 for none
     above, below : dwells outside, and at the end of each infeed [s]
     ahead  : how far above the depth already drilled rapid speed ends, at the first and at the last infeed
+    halves : where `less` is an infeed and less than two of it are left, the last two are equal
+    first  : feed of the first infeed; None for that of the hole
     """
 
     infeed: float
@@ -245,6 +255,8 @@ class Pecks:
     chip: float = 0.0
     above: float = 0.0
     below: float = 0.0
+    halves: bool = False
+    first: float | None = None
 
     def depths(self, depth: float) -> list[float]:
         """Where the infeeds end, down to a depth. Raises ValueError for infeeds that never reach it."""
@@ -256,6 +268,9 @@ class Pecks:
         while not found or found[-1] < depth:
             found.append(min((found[-1] if found else 0.0) + step, depth))
             step = max(step - self.less, least)
+            rest = depth - found[-1]
+            if self.halves and step == self.less < rest < 2.0 * self.less:
+                step = least = rest / 2.0
         return found
 
 
@@ -268,7 +283,7 @@ def pecked(hole: HolePlan, pecks: Pecks) -> Iterator[Row]:
         for part in range(1, equal_steps(deep - done, pecks.chip)):
             yield feed_to(hole.top - done - part * pecks.chip, hole.feed)
             yield go(hole.top - done - part * pecks.chip + pecks.back)
-        yield feed_to(hole.top - deep, hole.feed)
+        yield feed_to(hole.top - deep, pecks.first if k == 0 and pecks.first is not None else hole.feed)
         done = deep
         if k == len(depths) - 1:
             break

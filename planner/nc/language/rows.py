@@ -20,7 +20,7 @@ from planner.nc.lexer import Words
 from planner.nc.state import System
 
 RowWord = tuple[int, int, float | None]  # letter code, place, value
-G, M = ord("G"), ord("M")
+F, G, M = ord("F"), ord("G"), ord("M")
 AXES, CENTRES = (ord("X"), ord("Y"), ord("Z")), (ord("I"), ord("J"), ord("K"))
 TURNS, RADIUS = ord("P"), ord("R")
 ROTARY = (ord("A"), ord("B"), ord("C"))

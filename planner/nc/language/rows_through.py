@@ -7,6 +7,7 @@ the expanded program needs neither frames nor compensation. With none in force r
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from planner.nc.language.rows import (
     ROTARY,
     TURNS,
     AppendedRows,
+    F,
     G,
     M,
     Move,
@@ -67,6 +69,7 @@ class RowsThrough(Places):
         self._corner: CornerMove | None = None  # of the last move, which waits for the next one
         self._between: list[TravelRow] = []  # rows without a move behind it
         self.motion = 0
+        self._feed = 0.0  # the F word in force
         self.last: Move | None = None
         self.lost = False
         self._ahead: list[TravelRow] = []  # rows that come before the next ones
@@ -129,6 +132,7 @@ class RowsThrough(Places):
     def _take(self, row: TravelRow, out: list[TravelRow]) -> bool:
         """Take a row; True if the position is to be asked of the interpreter behind it."""
         codes = {value for letter, value, _ in row.words if letter == G}
+        self._feed = next((value for letter, value, _ in row.words if letter == F), self._feed)
         others = codes - {0.0, 1.0, 2.0, 3.0, 90.0, 91.0}
         for code in codes & {90.0, 91.0}:
             self.absolute = code == 90.0
@@ -223,6 +227,9 @@ class RowsThrough(Places):
             self.last, self.lost = move, False
         if self._corner is not None:
             (one, *between), move = self._corner.joined(move, self.normal)
+            if between and self._corner.feed is not None and self._feed > 0.0:
+                words = [(F, self._feed, move.at), *(word for word in move.rest.words if word[0] != F)]
+                move = replace(move, rest=TravelRow(words, row.line, row.frame))
             self._corner, waiting, self._between = None, self._between, []
             self._go(one, out)
             for row in waiting:
@@ -264,7 +271,7 @@ class RowsThrough(Places):
             return
         state = self.interpreter.state
         self.active, self.absolute, self.normal = True, state.absolute, state.normal
-        self.last = None
+        self.last, self._feed = None, state.word_feed
         self.motion = max(state.motion, -1 if state.fanuc else 0) if state.motion <= 3 else 0
         self._level = None if state.series is None else state.series.level * state.unit
         require(not state.absolute_centre, "frames and compensation with absolute arc centres are not read")

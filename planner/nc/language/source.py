@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.units import MM_PER_INCH
 from planner.nc.faults import Fault
 from planner.nc.integers import integers_of
 from planner.nc.interpreter import Interpreter
@@ -19,6 +20,7 @@ from planner.nc.language import tree
 from planner.nc.language.detect import bare, computes, ends_frame, may_compute
 from planner.nc.language.tree import PlainRows, ProgramFault, SourcePlace
 from planner.nc.lexer import BOM, Words
+from planner.nc.state import DEGREES, begins_in_inches
 
 NESTED_MAX = 100  # loops and branches in each other
 _PROGRAM = re.compile(r"[O:]\d+")  # the number of a program, or of a subprogram without keywords
@@ -52,7 +54,9 @@ class Source:
         self.words, self.file, self.first_row, self.begin = words, file, first_row, begin
         machine = interpreter.machine
         self.scale = integers_of(machine).scale(words)
+        self.unit = MM_PER_INCH if begins_in_inches(machine) else 1.0  # mm per unit at the start of a program
         self.at_tip = interpreter.ignored.at_tip  # words that switch the tool centre point are read
+        self.rotary = "".join(letter for letter in interpreter.state.others if letter in DEGREES)
         self.skips = interpreter.reading.block_delete  # lines that start with "/" are left out
         # subprograms of the machine's builder that move nothing, as the machine file or the user says
         given = machine.dialect.subprograms if machine is not None and machine.dialect is not None else ()

@@ -41,6 +41,11 @@ def position(axis: str) -> tree.Numbered:
     return tree.numbered(FIRST_POSITION + POSITIONS.index(axis))
 
 
+PER_RADIUS = tree.numbered(
+    FIRST_POSITION + len(POSITIONS)
+)  # X words per radius: 2 where they are diameters, else 1
+
+
 def _numbers(*ranges: tuple[int, int]) -> frozenset[int]:
     return frozenset(number for first, last in ranges for number in range(first, last))
 
@@ -190,14 +195,17 @@ def _linuxcnc_number(system: SystemVariables, number: int) -> float:
 
 
 class PositionVariables(SystemVariables):
-    """Positions of the axes alone, for languages whose parameters do not hold the state of the control."""
+    """Positions of the axes alone, X as programs have it, for languages whose parameters do not hold the state of the control."""
 
-    numbers = frozenset(range(FIRST_POSITION, FIRST_POSITION + len(POSITIONS)))
+    numbers = frozenset(range(FIRST_POSITION, FIRST_POSITION + len(POSITIONS) + 1))
 
     def get(self, parameter: int | str, depth: int) -> float:
         axis, state = int(parameter) - FIRST_POSITION, self.interpreter.state
+        per_radius = 2.0 if state.diameters else 1.0
+        if axis == len(POSITIONS):
+            return per_radius
         if axis < 3:
-            return self.here(axis)
+            return self.here(axis) * (per_radius if axis == 0 else 1.0)
         letter = POSITIONS[axis]
         return float(state.programmed()[state.letters.index(letter)]) if letter in state.letters else 0.0
 

@@ -227,13 +227,13 @@ class Travel(RowsThrough):
         self._approach = partial(way.approach, self._mapped.copy(), mapped, motion, radius, side)
         self.place, self._mapped, self.lost = first.copy(), mapped.copy(), True
 
-    def corner(self, kind: str, size: float, line: int, *, modal: bool = False) -> None:
-        """A rounding or chamfer at the end of the next move, of a size in mm; where it is `modal` there is
-        none if no move in the plane follows. Raises ValueError."""
+    def corner(self, kind: str, size: float, line: int, *, modal: bool, feed: float | None = None) -> None:
+        """A rounding or chamfer at the end of the next move, of a size in mm, with an F word of its own or that in
+        force; where it is `modal` there is none if no move in the plane follows. Raises ValueError."""
         if self._coming is not None and not self._coming.modal:
             raise ValueError("a second rounding or chamfer before the next move")
         self._begin()
-        self._coming = CornerMove(kind, size * self.scale(), line, modal)
+        self._coming = CornerMove(kind, size * self.scale(), line, modal, feed)
 
     def depart(self, way: ContourWay, end: FloatArray, *, raised: bool) -> None:
         """DEP: leave the contour, for LCT to its `end` (3,), and where it is `raised` to the height of that;

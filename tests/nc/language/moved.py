@@ -28,6 +28,7 @@ def read_twice(text: str, machine: Machine, reading: Reading) -> Program:
     assert again.kind.tolist() == program.kind.tolist()
     np.testing.assert_allclose(again.end, program.end, atol=1e-6)
     np.testing.assert_allclose(again.arc_sweep, program.arc_sweep, atol=1e-6)
+    np.testing.assert_allclose(again.feed, program.feed, rtol=1e-6)
     return program
 
 

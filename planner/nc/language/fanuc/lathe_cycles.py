@@ -77,7 +77,7 @@ def pattern(making: Making, given: Given) -> Iterable[Row]:
 
 def thread(making: Making, given: Given) -> Iterable[Row]:
     """G76."""
-    start, unit, part = _point(making.interpreter.state.programmed()), making.unit, 1.0 / _of_radius(making)
+    start, unit, part = _point(making.interpreter.state.programmed()), making.unit, 1.0 / making.per_radius
     x = part * given.get("X", start.imag / (part * unit))
     thread = lathe_cuts.LatheThread(
         start=start,
@@ -128,7 +128,7 @@ def _retract(making: Making, given: Given, cycle: str, at_most: float = math.inf
 
 
 def _allowance(making: Making, given: Given) -> complex:
-    return complex(given.get("W", 0.0), given.get("U", 0.0) / _of_radius(making)) * making.unit
+    return complex(given.get("W", 0.0), given.get("U", 0.0) / making.per_radius) * making.unit
 
 
 def _here(making: Making) -> complex:
@@ -155,13 +155,8 @@ def _point(position: FloatArray) -> complex:
 
 
 def _end(making: Making, given: Given, start: complex) -> complex:
-    x = given["X"] / _of_radius(making) * making.unit if "X" in given else start.imag
+    x = given["X"] / making.per_radius * making.unit if "X" in given else start.imag
     return complex(given["Z"] * making.unit if "Z" in given else start.real, x)
-
-
-def _of_radius(making: Making) -> float:
-    """X words per radius: 2 where they are diameters, else 1."""
-    return 2.0 if making.interpreter.state.diameters else 1.0
 
 
 def _cut(making: Making, faces: bool, cycle: Callable[..., Iterator[Leg]], *given: Any) -> list[Row]:
@@ -186,7 +181,7 @@ def _rows(making: Making, legs: Iterable[Leg], start: complex | None = None) -> 
 
 
 def _to(making: Making, point: complex) -> Row:
-    return [("X", _of_radius(making) * point.imag / making.unit), ("Z", point.real / making.unit)]
+    return [("X", making.per_radius * point.imag / making.unit), ("Z", point.real / making.unit)]
 
 
 def _contour_of(program: Program, offset: FloatArray, start: complex) -> turning.Contour:

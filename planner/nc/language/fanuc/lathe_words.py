@@ -8,7 +8,7 @@ G50 with coordinates are refused.
 
 from collections.abc import Callable, Iterable
 
-from planner.nc.language import tree
+from planner.nc.language import makers, tree
 from planner.nc.language.fanuc.lathe_cycles import MAKERS
 from planner.nc.language.fanuc.parser import FanucParser
 from planner.nc.language.making import assumed_row
@@ -103,7 +103,9 @@ class LatheWords(FanucParser):
             self.body.append(tree.Line(line.place, tuple(word for word in words if word.letter != "H")))
             return
         words = tuple(changed for word in words if (changed := self._changed(word, line)) is not None)
-        super()._words(self._threads(words, codes), assignments, line)
+        words, thread = self._threads(words, codes, line)
+        super()._words(words, assignments, line)
+        self.body += thread
 
     def _corner_words(self, words: tree.Words) -> tree.Words:
         """C, R, A and a lone I or K of a G1 as ,C ,R and ,A: a chamfer, a rounding and an angle."""
@@ -160,17 +162,21 @@ class LatheWords(FanucParser):
             return word._replace(value=tree.Number(94.0 if code == "G98" else 95.0))
         return word
 
-    def _threads(self, words: tree.Words, codes: set[str]) -> tree.Words:
+    def _threads(
+        self, words: tree.Words, codes: set[str], line: SourceLine
+    ) -> tuple[tree.Words, list[tree.Statement]]:
+        """The words of a line but those of G32, and what G32 cuts."""
         if "G32" in codes:
             self.threading = True
         elif codes & _LINES_AND_ARCS:
             self.threading = False
         if not self.threading or not any(word.letter in "XZ" for word in words):
-            return words
-        thread = tree.Number(33.0)
-        others = [w._replace(value=thread) if w.code == "G32" else w for w in words if w.letter != "F"]
-        lead = [] if self.feed is None else [tree.Word("K", others[-1].at, self.feed)]
-        return (*others, *lead)
+            return words, []
+        if self.feed is None:
+            raise line.fault("G32 needs the lead of its thread as an F word")
+        given = {word.letter: word.value for word in words if word.letter in "XZ"} | {"K": self.feed}
+        others = tuple(w for w in words if w.letter not in "XZF" and w.code != "G32")
+        return others, [tree.made(line.place, makers.threaded, **given)]
 
     def _tool(self, words: tree.Words, number: tree.Expression, line: SourceLine) -> tree.Words:
         """T0203 as rows of its own; the other words are left."""

@@ -7,7 +7,7 @@
     203, 205 pecking         Q202 infeed, less by Q212 each time but at least Q205; Q256 retract to break the chip, Q208 feed out;
                              203: Q213 breaks of the chip before a retract; 205: Q257 depth between breaks,
                              Q258 and Q259 how far above the ground rapid speed ends
-    206, 207, 209 tapping    at Q206; with the lead Q239; breaking the chip each Q257, back by Q256 leads (0: out of the hole)
+    206, 207, 209 tapping    at Q206; with the lead Q239; breaking the chip each Q257: back by Q256 leads (0: out), out by Q403
     208 bore milling         Q335 diameter, Q334 infeed per turn
     251 rectangular pocket   Q218 Q219 sides, Q220 corners, Q224 turned by, Q367 where the tool stands in it
     252 circular pocket      Q223 diameter
@@ -50,7 +50,7 @@ from planner.nc.language.making import (
 from planner.nc.language.milling import ArcSlot, PocketPlan, RoundedRectangle, pocket_rows
 from planner.nc.language.rows import require
 
-_FIRST, _LAST = 200, 385  # Q parameters of cycles
+_FIRST, _LAST = 200, 403  # Q parameters of cycles
 _FEEDS = (206, 207, 208, 385)  # that inch programs give in tenths of an inch per minute
 _AWAY = {1: (-1, 0), 2: (0, -1), 3: (1, 0), 4: (0, 1)}  # directions of Q214
 _AWAY_BY = 0.2  # mm
@@ -136,7 +136,9 @@ def _tapped_by_breaks(making: Making, hole: HolePlan, given: Given) -> Iterator[
         deep = min(k * given["Q257"], depth) if given["Q257"] else depth
         back = given["Q256"] * abs(lead)
         up = hole.clear if k == count or back == 0.0 else min(hole.top - deep + back, hole.clear)
-        yield from tapped(making, replace(hole, bottom=hole.top - deep), lead, speed, up=up, start=k == 1)
+        faster = given["Q403"] if k == count else 0.0
+        part = replace(hole, bottom=hole.top - deep)
+        yield from tapped(making, part, lead, speed, back=speed * (faster or 1.0), up=up, start=k == 1)
 
 
 def _milled(making: Making, hole: HolePlan, given: Given) -> Iterator[Row]:

@@ -240,7 +240,7 @@ class Definitions(Flow):
         before: text.Rows = []
         after: text.Rows = []
         machine, nothing = False, set[int](() if self.compensates else tables.OF_COMPENSATION)
-        nothing |= set(() if self.source.at_tip else tables.OF_ROTARY)
+        nothing |= set(() if self.source.rotary else tables.OF_ROTARY)
         for code, column in given.codes:
             at = block.byte(column)
             as_it_is = Line(block.place, (word("M", at, float(code)),))

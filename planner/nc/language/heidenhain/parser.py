@@ -134,11 +134,14 @@ class HeidenhainParser(Definitions):
         return ends
 
     def _straight(self, block: text.Block) -> text.Rows:
-        given, name = text.items(block, turning=self.source.at_tip), block.function
+        given, name = text.items(block, self.source.rotary), block.function
         before, after, machine = self._codes(block, given, straight=name == "L")
         if machine and any(relative for _, relative in given.axes.values()):
             raise block.fault("an incremental coordinate with M91 is not read; write the machine coordinate")
         lines: text.Rows = [*before, *self._side(block, given)]
+        mixed = given.axes.keys() & set("XYZ") and given.axes.keys() - set("XYZ")
+        if mixed and not given.fast and not self.source.at_tip:
+            lines.append(assumed_row(block.place, "feed of linear axes"))
         if name == "LP":
             self._need_pole(block)
             lines += self.moves.to_polar(block, given)
@@ -158,12 +161,12 @@ class HeidenhainParser(Definitions):
         if rounded:
             block.take(r"\s*R(?=\s*[-+.\dQ])")
         number = block.value()
-        feed = block.take(r"\s*F\s*(?=[-+.\dQA])")
-        if feed and not block.take(r"AUTO\b"):
-            block.value()
+        feed = None
+        if block.take(r"\s*F\s*(?=[-+.\dQA])"):
+            feed = self.moves.automatic if block.take(r"AUTO\b") else block.value()
         block.end("nothing but a feed may follow the number of RND and CHF")
-        said = [assumed_row(block.place, "feed of corners")] if feed else []
-        return [*said, corner(block.place, "RND" if rounded else "CHR", number)]
+        feed = None if feed is None else self.moves.scaled(feed)
+        return [corner(block.place, "RND" if rounded else "CHR", number, feed=feed)]
 
     def _arc(self, block: text.Block) -> text.Rows:
         name, given = block.function, text.items(block)

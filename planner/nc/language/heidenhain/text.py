@@ -47,7 +47,6 @@ _ITEM = (
     r"(?P<radius>R)(?=\s*[-+.\dQ])|F\s*(?P<fast>MAX|AUTO)|(?P<unit>F[ZUT])|(?P<feed>F)|M\s*(?P<code>\d+)|"
     r"(?P<ahead>LA)(?=\s*\d))"
 )
-_ROTARY = ("A", "B", "C")
 _WITH_AXES = (94, 138)  # M codes that may name rotary axes
 
 
@@ -238,9 +237,9 @@ class Items:
     side: int | None = None  # 1 for RL, -1 for RR, 0 for R0, None where none is given
 
 
-def items(block: Block, turning: bool = False) -> Items:
-    """Read what stands behind the function; `turning`: coordinates of A, B and C, too, as the interpreter knows
-    them. Raises ProgramFault for what a path function does not take here."""
+def items(block: Block, rotary: str = "") -> Items:
+    """Read what stands behind the function; `rotary`: letters of rotary axes, whose coordinates are read, too. Raises
+    ProgramFault for what a path function does not take here."""
     found, end = Items(), len(block.text.rstrip())
     while block.column < end:
         item = block.take(_ITEM)
@@ -250,8 +249,8 @@ def items(block: Block, turning: bool = False) -> Items:
         at = item.end() - len(item[0].lstrip())
         if item["axis"]:
             name = item["axis"].upper()
-            if name[-1] not in "XYZ" and not (turning and name[-1] in _ROTARY):
-                raise block.fault(f"axis {name[-1]} is not planned; X, Y and Z are", at)
+            if name[-1] not in "XYZ" + rotary:
+                raise block.fault(f"axis {name[-1]} is not planned here; {', '.join('XYZ' + rotary)} are", at)
             given = block.value()
             if name[-1] in found.axes:
                 raise block.fault(f"a second {name[-1]} in this block", at)

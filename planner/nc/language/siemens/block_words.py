@@ -116,7 +116,8 @@ class BlockWords(Commands):
                 row.before.insert(0, tree.made(reader.place, makers.compensate, side=_SIDES[int(code)]))
                 return
             if code in (0.0, 1.0, 2.0, 3.0):
-                self.circular, self.turns = False, code > 1.0
+                self.circular, self.turns, self.threading = False, code > 1.0, False
+            self.threading |= code == 33.0
             row.codes.add(code)
             if code == 9.0:
                 row.stops = True
@@ -137,6 +138,12 @@ class BlockWords(Commands):
             row.take("GXYZS")
         if 4.0 in row.codes:
             self._dwell(reader, row)
+        elif self.feed_factor != 1.0 and not self.inverse_time:
+            factor = tree.Number(self.feed_factor)
+            row.words = [
+                word if word.letter != "F" else tree.word("F", word.at, word.value * factor)
+                for word in row.words
+            ]
         ends = {f"M{number}" for number in (tables.RETURNS if self.source.file else (17,))}
         ended = [word for word in row.words if word.code in ends]
         row.words = [word for word in row.words if word not in ended]
@@ -150,8 +157,18 @@ class BlockWords(Commands):
             lead = next((given.pop(one) for one in "IJK" if one in given), tree.ZERO)
             tap = partial(makers.tap_path, code=min(taps))
             self.body.append(tree.made(place, tap, lead=lead, **self._absolutes(given)))
+        thread: list[tree.Statement] = []
+        if self.threading and row.has("XYZ"):
+            given = row.take("XYZIJK")
+            along = next((one for one in "KIJ" if one in given), None)
+            if along is None:
+                raise reader.fault("G33 needs its lead along the axis that moves most: K, I or J", 0)
+            lead = given.pop(along)
+            row.words = [word for word in row.words if word.code != "G33"]
+            thread = [tree.made(place, makers.threaded, K=lead, **self._absolutes(given))]
         if row.words or row.assigned:
             self.body.append(tree.Line(place, tuple(row.words), tuple(row.assigned)))
+        self.body += thread
         if row.stops:
             self.body.append(tree.row(place, ("G", 4.0), ("P", tree.ZERO)))
         if moved and self.cycle is not None:
@@ -196,8 +213,12 @@ class BlockWords(Commands):
             self.absolute = code == 90
             reader.require(reader.peek() != "(", f"G{code}(...) is not read")
         self.normal = PLANES.get(code, self.normal)
-        if code in (70, 71, 700, 710):
-            self.unit = MM_PER_INCH if code in (70, 700) else 1.0
+        self.inverse_time = code == 93 or (self.inverse_time and code not in tables.FEED_MODES)
+        if code in (70, 71, 700, 710):  # F beside it is in the new unit
+            self.body.append(tree.row(reader.place._replace(at=at), ("G", tables.CODES[code][0])))
+            unit = MM_PER_INCH if code in (70, 700) else 1.0
+            self.feed_factor = self.source.unit / unit if code in (70, 71) else 1.0
+            return []
         if f"G{code}" in tables.REFUSED and not (code == 451 and not self.compensates):
             raise reader.fault(tables.refusal(f"G{code}"), at - reader.start)
         if code in (62, 621):

@@ -14,7 +14,7 @@ from planner.nc.language import makers, swivel, tree
 from planner.nc.language.siemens import cycles, tables
 from planner.nc.language.siemens.control import Control, changed
 from planner.nc.language.siemens.text import TIMES, LineTokens, handed_over
-from planner.nc.language.system_variables import position
+from planner.nc.language.system_variables import PER_RADIUS, position
 
 AXES = "XYZ"
 _CALLED = re.compile(r"[A-Z_]{2}\w*|L\d+")
@@ -26,6 +26,12 @@ _CLOSER = {"AC": "", "IC": "", "DC": "WRAPPED", "ACP": "TURNED", "ACN": "TURNED"
 def _polar(name: str) -> tree.Named:
     """The pole (x, y, z), the radius and the angle of the last polar coordinates."""
     return tree.Named(f"_polar {name}", True)
+
+
+def _way_of_polar(axis: str, part: str) -> tree.Expression:
+    """What the last polar coordinates add to an axis, COS or SIN of the angle times the radius."""
+    way = _polar("rp") * tree.op(part, _polar("ap"))
+    return way * PER_RADIUS if axis == "X" else way
 
 
 @dataclass
@@ -61,6 +67,7 @@ class Commands(Control):
 
     normal = 2
     turns = False
+    threading = False  # G33 is in force
 
     def _cycle(self, reader: LineTokens) -> None:
         name, place = reader.peek(-1), reader.place
@@ -186,7 +193,7 @@ class Commands(Control):
         value = reader.expression()
         reader.expect(")")
         if letter in "IJK":
-            return value - position("XYZ"["IJK".index(letter)]) if kind == "AC" else value
+            return self._centre("IJK".index(letter), value) if kind == "AC" else value
         good = letter in ("XYZABC" if kind in ("AC", "IC") else "ABC")
         text = "AC and IC stand with X Y Z A B C and I J K; DC, ACP, ACN with A B C"
         reader.require(good, text, at - reader.start)
@@ -200,6 +207,12 @@ class Commands(Control):
         elif kind == "IC":
             return here + value
         return value if self.absolute else value - here
+
+    @staticmethod
+    def _centre(axis: int, place: tree.Expression) -> tree.Expression:
+        """A centre's I, J or K, a radius, for an absolute coordinate."""
+        way = place - position(AXES[axis])
+        return way / PER_RADIUS if axis == 0 else way
 
     def _is_call(self, reader: LineTokens) -> bool:
         """True if the line is a call by a name."""
@@ -266,7 +279,7 @@ class Commands(Control):
         given = row.take("XYZG")
         if row.polar:
             self.body.append(tree.assign(reader.place, *row.polar))
-            way = [_polar("rp") * tree.op(part, _polar("ap")) for part in ("COS", "SIN")]
+            way = [_way_of_polar(*one) for one in zip(plane, ("COS", "SIN"), strict=True)]
         else:
             way = [given.get(axis, tree.ZERO) for axis in plane]
         reader.require(not set(given) - {*plane, "G"}, "a pole lies in the plane (G17, G18, G19)", 0)
@@ -280,11 +293,11 @@ class Commands(Control):
             raise reader.fault("AP and RP stand instead of coordinates in the plane", 0)
         self.body.append(tree.assign(reader.place, *row.polar))
         for k, part in zip(plane, ("COS", "SIN"), strict=True):
-            end = _polar(AXES[k]) + _polar("rp") * tree.op(part, _polar("ap"))
+            end = _polar(AXES[k]) + _way_of_polar(AXES[k], part)
             end = end if self.absolute else end - position(AXES[k])
             row.words.append(tree.word(AXES[k], reader.place.at, end))
             if self.turns and not row.has("R"):
-                row.words.append(tree.word("IJK"[k], reader.place.at, _polar(AXES[k]) - position(AXES[k])))
+                row.words.append(tree.word("IJK"[k], reader.place.at, self._centre(k, _polar(AXES[k]))))
 
     def _home(self, reader: LineTokens, code: int, at: int) -> list[tree.Word]:
         """G74 X1=0: to the reference point of axes; G75: to their fixed point, G28 and G30 here."""

@@ -25,11 +25,14 @@ class Control(LineParser):
         # where the statements of lines with labels stand: a body, and the first and behind the last of them
         self.lines: dict[str, tuple[list[tree.Statement], int, int]] = {}
         self.names: text.Names = {}  # of the variables
+        self.whole: set[str] = set()  # variables of the kind INT
         self.array_values = 0  # of arrays so far
         self.fastest: tree.Expression | None = None  # speed of the spindle under G96 (LIMS)
         self.handed_back: list[tuple[tree.Parameter, tree.Expression]] = []  # values of PROC at its end
         self.absolute = True  # G90 is in force
-        self.unit = 1.0  # mm per unit of the program
+        # what F is multiplied with: under G70 and G71 it stays in the unit that the control starts with
+        self.feed_factor = 1.0
+        self.inverse_time = False  # G93 is in force
         self.cycle: list[tree.Statement] | None = None  # of MCALL, which follows every row that moves
         self.compensates = bool(_COMPENSATES.search(source.words.data))  # the file has G41 or G42
 
@@ -70,9 +73,9 @@ class Control(LineParser):
         target = reader.parameter(reader.tokens[reader.next])
         if target is None:
             raise reader.fault("FOR needs a variable that is declared")
-        reader.pop()
+        name = reader.pop().text
         reader.expect("=")
-        first = reader.expression()
+        first = self._kept(name, reader.expression())
         reader.expect("TO")
         last = reader.expression()
         self.body.append(tree.assign(reader.place, (target, first)))
@@ -181,6 +184,7 @@ class Control(LineParser):
     def _declare(self, reader: LineTokens, name: str, kind: str) -> None:
         """A variable, its sizes and its first values."""
         sizes = self._sizes(reader)
+        self.whole = self.whole | {name} if kind == "INT" else self.whole - {name}
         if kind in TEXTS:
             self.names[name] = TEXT
             if reader.take("="):
@@ -188,7 +192,7 @@ class Control(LineParser):
             return
         if not sizes:
             self.names[name] = (0, ())
-            value = reader.expression() if reader.take("=") else tree.ZERO
+            value = self._kept(name, reader.expression()) if reader.take("=") else tree.ZERO
             self.body.append(tree.assign(reader.place, (variable(name), value)))
             return
         count = math.prod(map(round, sizes))
@@ -226,7 +230,7 @@ class Control(LineParser):
         brackets alone where it is defined (`kinds`)."""
         kind, (first, sizes) = reader.peek(), self.names.get(name, (0, ()))
         if kind not in kinds or kind in self.names or not first:
-            return [(target, reader.expression())]
+            return [(target, self._kept(name, reader.expression()))]
         assert isinstance(target, tree.Numbered)
         if (at := _constant(target.index)) is None:
             raise reader.fault(f"{kind} begins at a place that is a number here: {name}[0]={kind}(...)", 0)
@@ -236,7 +240,14 @@ class Control(LineParser):
         if not 0 < len(given) <= left:
             raise reader.fault(f"{kind} gives {len(given)} values; {name} has {left} from there on", 0)
         values = given[:1] * left if kind == "REP" else given
-        return [(tree.Numbered(tree.Number(at + k)), value) for k, value in enumerate(values)]
+        return [
+            (tree.Numbered(tree.Number(at + k)), self._kept(name, value)) for k, value in enumerate(values)
+        ]
+
+    def _kept(self, name: str, value: tree.Expression) -> tree.Expression:
+        """What a variable of that name keeps of a value: of the kind INT the nearest whole number."""
+        whole = isinstance(value, tree.Number) and value.value.is_integer()
+        return tree.op("ROUND", value) if name in self.whole and not whole else value
 
     def _text_value(self, reader: LineTokens) -> None:
         """Go past a text; what the control computes of texts moves nothing."""
@@ -270,8 +281,9 @@ class Control(LineParser):
                     kinds = f"a value of PROC is one of {', '.join(sorted(TYPES | TEXTS))} and a name"
                     raise reader.fault(f"{kinds}; arrays and values that a call may leave out are not read")
                 self.names[name] = TEXT if kind in TEXTS else (0, ())
+                self.whole |= {name} if kind == "INT" else set()
                 k, back = len(taken), tree.ONE if by_name else tree.ZERO
-                taken.append((variable(name), handed_over(k)))
+                taken.append((variable(name), self._kept(name, handed_over(k))))
                 self.handed_back += [(handed_over(k), variable(name)), (changed(k), back)]
                 reader.require(reader.take(",") or reader.peek() == ")", ") is missing")
         reader.leave()  # SAVE, DISPLOF and others

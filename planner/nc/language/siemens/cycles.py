@@ -3,9 +3,10 @@
     RTP retract plane    RFP reference plane    SDIS distance above it    DP depth, or DPR below the reference plane    DTB dwell
 
     CYCLE81, CYCLE82    in and, after a dwell, rapid out
-    CYCLE83             by infeeds: the first to FDEP (or FDPR below the reference plane), each of the others less by DAM, but not less
-                        than DAM; between them a dwell below (DTB), and out to RFP + SDIS with a dwell there
-                        (DTS; VARI 1), or back by 1 mm to break the chip (VARI 0)
+    CYCLE83             by infeeds: the first to FDEP (or FDPR below the reference plane) at the share FRF of F, each of the
+                        others less by DAM, but not less than DAM, and the last two equal; between them a dwell
+                        below (DTB), and out to RFP + SDIS with a dwell there (DTS; VARI 1), or back by 1 mm to
+                        break the chip (VARI 0)
     CYCLE84, CYCLE840   tapping: SDAC, MPIT (size) or PIT (lead), SST and SST1 speed in and out;  SDR, SDAC, ENC, MPIT, PIT
     CYCLE85             FFR in, RFF out                 CYCLE86   stopped spindle, away by RPA RPO RPAP, rapid out
     CYCLE87, CYCLE88    spindle stop and M0 on the ground (CYCLE88: after a dwell), rapid out
@@ -140,12 +141,13 @@ def _lead(given: Given, unit: float) -> float:
 
 def _tapped(making: Making, given: Given, hole: HolePlan, *, rigid: bool) -> Iterator[Row]:
     """CYCLE84, and CYCLE840 with a chuck, at the speed of the program and without a lead at its F."""
-    lead, speed = _lead(given, making.unit), making.interpreter.state.spindle.speed
+    state = making.interpreter.state
+    lead, speed = _lead(given, making.unit), state.spindle.speed
     if rigid:
         _required("CYCLE84", given, "SST")
         return tapped(making, hole, lead, given["SST"], back=given.get("SST1", 0.0))
     if lead == 0.0 and speed > 0.0:
-        lead = making.interpreter.state.feed * SECONDS_PER_MINUTE / making.unit / speed
+        lead = state.word_feed / (speed if state.feed_mode == "per minute" else 1.0)
     return tapped(making, hole, lead, speed)
 
 
@@ -181,6 +183,9 @@ def _bored(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
 def _deep(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
     less, last, apart = given.get("DAM", 0.0), given.get("DTD", 0.0), _APART / making.unit
     require(less >= 0.0, "DAM below 0 of CYCLE83, infeeds as shares, is not read; give their difference")
+    share = given.get("FRF", 0.0) or 1.0
+    feed = making.interpreter.state.word_feed if share != 1.0 else None
+    require(feed is None or 0.0 < share < 1.0, "FRF of CYCLE83, a share of F, is to be above 0 and up to 1")
     pecks = Pecks(
         max(hole.top - _depth_of(given, "FDEP", "FDPR"), _SHORT),
         back=given.get("VRT", 0.0) or apart,
@@ -190,8 +195,12 @@ def _deep(making: Making, given: Given, hole: HolePlan) -> Iterator[Row]:
         breaks=0 if given.get("VARI", 0.0) else math.inf,
         above=given.get("DTS", 0.0),
         below=max(given.get("DTB", 0.0), 0.0),
+        halves=not given.get("MDEP", 0.0),
+        first=None if feed is None else share * feed,
     )
-    return pecked(replace(hole, dwell=last) if last > 0.0 else hole, pecks)
+    yield from pecked(replace(hole, dwell=last if last > 0.0 else hole.dwell, feed=feed), pecks)
+    if feed is not None:
+        yield [("F", feed)]
 
 
 def _slots(making: Making, given: Given, *, name: str) -> Iterator[Row]:

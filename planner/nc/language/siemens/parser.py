@@ -60,6 +60,11 @@ class SiemensParser(BlockWords):
         same = np.isin(letter, [ord(c) for c in tables.PLAIN_LETTERS])
         same &= (letter != ord("G")) | np.isin(value, tables.SAME_CODES)
         same &= (letter != ord("M")) | ~np.isin(value, tables.RETURNS if self.source.file else (17,))
+        is_code, other = letter == ord("G"), 70.0 if self.source.unit == 1.0 else 71.0
+        if (is_code & (value == other)).any():  # F has another unit than lengths
+            same &= (letter != ord("F")) & ~(is_code & (value == 94.0))
+        if (is_code & (value == 33.0)).any():  # what it cuts has its lead along an axis
+            same &= ~np.isin(letter, list(b"XYZ"))
         targets = [int(label) for label in _TARGETS.findall(words.data)]
         same &= ~((letter == ord("N")) & np.isin(value, targets))
         found = words.rows_with(np.flatnonzero(~same))
@@ -81,6 +86,7 @@ class SiemensParser(BlockWords):
             self.absolute = code == 90.0 if code in (90.0, 91.0) else self.absolute
             self.normal = PLANES.get(code, self.normal)
             self.turns = code > 1.0 if code <= 3.0 else self.turns
+            self.threading &= code > 3.0
         if self.cycle is None and self.rounding is None:
             self.body.append(rows)
             return

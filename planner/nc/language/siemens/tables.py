@@ -9,10 +9,10 @@ from planner.nc.settings import TOOL_POINT_OFF, TOOL_POINT_ON
 # Letters of words with the same meaning in RS274NGC.
 PLAIN_LETTERS = "NGXYZIJKFSMABCUVW"
 RETURNS = (2, 17, 30)  # M codes that end a subprogram
-SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 33, 54, 55, 56, 57, 90, 91, 94)  # G codes with the same meaning
+SAME_CODES = (0, 1, 2, 3, 17, 18, 19, 54, 55, 56, 57, 90, 91, 94)  # G codes with the same meaning
 # G codes of Siemens that are others here; an empty tuple changes nothing.
 CODES: dict[int, tuple[float, ...]] = {
-    **{code: (float(code),) for code in (*SAME_CODES, 4, 93, 95)},
+    **{code: (float(code),) for code in (*SAME_CODES, 4, 33, 93, 95)},
     9: (),  # exact stop of one block; a full stop is added behind it
     **dict.fromkeys((53, 153), (53.0,)),
     60: (61.1,),
@@ -27,6 +27,7 @@ CODES: dict[int, tuple[float, ...]] = {
     **dict.fromkeys((40, 41, 42, 110, 111, 112, 290, 450, 451, 460, 601, 602, 603, 621, 62, 25, 26, 140), ()),
     **dict.fromkeys(range(505, 600), (54.1,)),
 }  # fmt: skip
+FEED_MODES = (94, 95, 96, 97, 961, 962, 971, 972, 973)  # that end G93
 SYSTEMS_FURTHER = 500  # G505 is the work system 5
 # Commands that move nothing and change nothing of what is planned, with or without arguments or a value:
 # feedforward, compressors (their tolerance is the program's), how orientations change where that is as

@@ -33,6 +33,11 @@ LANGUAGE = tree.Language(
     operations=ARITHMETIC
     | {
         ("MOD", 2): "fmod({0},{1})",
+        # > and < are exact (job planning, "Precision correction on comparison errors")
+        ("EQ", 2): "equal({0},{1})",
+        ("NE", 2): "(not equal({0},{1}))",
+        ("GE", 2): "({0}>={1} or equal({0},{1}))",
+        ("LE", 2): "({0}<={1} or equal({0},{1}))",
         ("B_AND", 2): "float(int({0})&int({1}))",
         ("B_OR", 2): "float(int({0})|int({1}))",
         ("B_XOR", 2): "float(int({0})^int({1}))",

@@ -54,7 +54,7 @@ def test_with_a_point_haas_takes_seconds() -> None:
     assert dwells(parse_program(text, machine(), FANUC)) == [1.5, 2.0, 0.25, 0.25]
 
 
-@pytest.mark.parametrize("text", ["G4 P40", "G82 X1 Z-2 R1 P7\nX8 P0.5", "G82 Z-1 R1 P2\nG80 G4 P3"])
+@pytest.mark.parametrize("text", ["G4 P40", "G0 Z3\nG82 X1 Z-2 R1 P7\nX8 P0.5", "G82 Z-1 R1 P2\nG80 G4 P3"])
 def test_other_dialects_take_seconds_and_nothing_else_changes(text: str) -> None:
     """The same program with its times times a thousand is Fanuc's."""
     fanuc = " ".join(

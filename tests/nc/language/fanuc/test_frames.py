@@ -14,7 +14,7 @@ from planner.machine import Machine, ToolData
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
 
-HEAD = "O1000\nG17 G21 G90 G94 G98 F600\nG0 X0 Y0 Z10.\n"
+HEAD = "O1000\nG17 G21 G90 G94 G98\nF600 G0 X0 Y0 Z10.\n"
 TOOLED = MACHINE.model_copy(update={"tools": {"1": ToolData(length=0.0, diameter=4.0)}})
 COSINE, SINE = math.cos(math.radians(30)), math.sin(math.radians(30))
 CASES = {

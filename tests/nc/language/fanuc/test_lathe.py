@@ -47,7 +47,9 @@ CASES = {
     "a tool": ("T0203\nG0 W1\nT0200\nM30", "T2 M6\nG43 H3\nG0 Z3\nG49\n"),
     "positions": ("#1=#5001\n#2=#5002\nG0 X[#1-4] Z[#2*2]\nU0\nM30", "G0 X36 Z4\nX36\n"),
     "thread": ("S600 M3\nG0 X20\nG32 W-10 F2.\nG0 U5\nW10\nM30", "S600 M3\nG0 X20\nG33 Z-8 K2\nG0 X25\nG0 Z2\n"),
-    "thread on": ("S600 M3\nG32 W-10 F2.\nU2 W-1\nG0 U5\nM30", "S600 M3\nG33 Z-8 K2\nG33 X42 Z-9 K2\nG0 X47\n"),
+    "thread on": ("S600 M3\nG32 W-10 F2.\nU2 W-1\nG0 U5\nM30", "S600 M3\nG33 Z-8 K2\nG33 X42 Z-9 K2.8284271247461903\nG0 X47\n"),
+    "thread that is wider than long": ("S600 M3\nG0 X20\nG32 U40. W-10 F2.\nX70.\nG0 U5\nM30",
+                                       "S600 M3\nG0 X20\nG33 X60 Z-8 K2.23606797749979\nG33 X70 K2\nG0 X75\n"),
     "roughing": (G71 + PROFILE + "G0 X50\nM30", ROUGHED + "G0 X50\n"),
     "roughing in one block": ("G71 P10 Q20 D3. U1. W0.2 F200\n" + PROFILE + "M30", ROUGH.format(z=f"{Z_ON_ARC:.15f}", e=0.5)),
     "finishing": (

@@ -7,6 +7,7 @@ import pytest
 
 from planner.base.errors import InputError
 from planner.machine import ToolData, load_machine, machine_from_dict
+from planner.nc.program import Kind
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
 
@@ -105,3 +106,51 @@ def test_air_and_questions_of_haas_are_no_printers() -> None:
 def test_a_peck_far_beyond_the_hole_is_said(peck: str, said: bool) -> None:
     program = parse_program(f"{HEAD}G0 Z9.\nG83 X1. Z-5. R1. {peck} F100\nG80\nM30", MACHINE)
     assert any(f"line 4: {peck} is one peck to the bottom" in text for text in program.assumptions) == said
+
+
+def levels(text: str) -> list[tuple[int, float, float]]:
+    """Kind, x and z of the blocks behind a position at Z10."""
+    program = parse_program(f"{HEAD}G0 X0 Y0 Z10.\n{text}\nG80\nM30", MACHINE)
+    return [(int(kind), x, z) for kind, (x, _, z) in zip(program.kind, program.end.tolist(), strict=True)][1:]
+
+
+def test_between_holes_the_tool_stays_at_its_height() -> None:
+    """Fanuc's first operation of a cycle is the move in the plane, where the tool is; LinuxCNC rises on the way."""
+    found = levels("G99 G81 X1. Z-5. R2.\nG98 X2.\nX3. R12.")
+    r, f = int(Kind.RAPID), int(Kind.LINE)
+    first = [(r, 1, 10), (r, 1, 2), (f, 1, -5), (r, 1, 2)]
+    assert found == [
+        *first,
+        (r, 2, 2),
+        (f, 2, -5),
+        (r, 2, 10),
+        (r, 3, 10),
+        (r, 3, 12),
+        (f, 3, -5),
+        (r, 3, 12),
+    ]
+
+
+def test_g53_is_rapid_also_while_g1_is_in_force() -> None:
+    head = f"{HEAD}G1 X5. Y0 Z1.\n"
+    program = parse_program(f"{head}G53 Z0\nX7.\nG53 G1 Z2.\nM30", MACHINE)
+    assert program.kind.tolist() == [Kind.LINE, Kind.RAPID, Kind.LINE, Kind.LINE]
+    assert "rapid move, as Fanuc has it" in " ".join(program.assumptions)
+    other = parse_program("G21 G90 F600\nG1 X5 Z1\nG53 Z0\n", MACHINE, Reading(dialect="linuxcnc"))
+    assert other.kind.tolist() == [Kind.LINE, Kind.LINE]
+
+
+def test_tapping_by_infeeds() -> None:
+    program = parse_program(
+        f"{HEAD}G0 Z10.\nM3 S500\nG98 G84 X1. Z-10. R2. Q5.\nX2.\nG84 X3. Z-10. Q0\nG80\nM30", MACHINE
+    )
+    cut = program.end[program.kind == Kind.LINE]
+    assert cut[cut[:, 0] == 1, 2].tolist() == cut[cut[:, 0] == 2, 2].tolist() == [-3, 2, -8, 2, -10, 2]
+    assert cut[cut[:, 0] == 3, 2].tolist() == [-10, 2]
+    assert "each infeed of Q leads out to R" in " ".join(program.assumptions)
+    # a full stop at every end but the last, which goes on to the level of G98
+    of_first = program.line == 5
+    assert (program.kind[of_first] == Kind.STOP).sum() == 5
+    for q in ("-1.", "0.0000001"):
+        with pytest.raises(InputError, match="Q"):
+            parse_program(f"{HEAD}G0 Z10.\nM3 S500\nG98 G84 X1. Z-10. R2. Q{q}\nM30", MACHINE)

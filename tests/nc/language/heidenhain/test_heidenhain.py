@@ -7,7 +7,7 @@ import pytest
 from language_programs import same
 
 from planner.base.errors import InputError
-from planner.machine import load_machine
+from planner.machine import Machine, load_machine
 from planner.nc.program import Kind, PathControl, Program
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
@@ -102,6 +102,30 @@ def test_a_rounded_rectangle_of_one_coordinate_each() -> None:
         found.end[1:, :2], [[35, 0], [40, 5], [40, 25], [35, 30], [5, 30], [0, 25], [0, 0]], atol=1e-9
     )
     np.testing.assert_allclose(found.arc_sweep, np.pi / 2, atol=1e-9)
+
+
+def test_a_feed_of_a_corner_is_that_of_the_corner_alone() -> None:
+    text = "L X+0 Y+0 FMAX\nL X+40 F500{0}\nRND R5 F50\nL Y+30\nCHF 2 FQ1\nL X+9 F700\nRND R2\nL Y+9\nRND R1 F AUTO\nL X+30"
+    feeds = [500, 50, 500, 60, 700, 700, 700, 300, 700]
+    found = read("Q1 = 60\nTOOL CALL 1 Z S500 F300\n" + text.format(""))
+    assert (found.feed[found.kind != Kind.RAPID][1:] * 60).tolist() == pytest.approx(feeds)
+    assert not [note for note in found.assumptions if "RND" in note]
+
+
+def test_rotary_axes_of_a_machine_without_kinematics() -> None:
+    axes = {a: {"velocity": 100, "acceleration": 1000, "jerk": 1e4} for a in "xyza"}
+    four = Machine(name="four", dt=1e-3, tolerance=0.05, axes=axes)
+    head = "BEGIN PGM A MM\nL X+0 A+0 FMAX\n"
+    found = parse_program(f"{head}L A+350 F360\nL X+9 IA+20 F500\nL A+10 M126 FMAX\nEND PGM A MM\n", four)
+    np.testing.assert_allclose(np.degrees(found.end[:, 3]), [0, 350, 370, 370], atol=1e-9)
+    np.testing.assert_allclose(found.feed[1:3] * 60, [np.radians(360), 500])
+    assert [note for note in found.assumptions if "beside rotary axes" in note]
+    for line, said in (
+        ("L B+9", "axis B is not planned here; X, Y, Z, A are"),
+        ("L A+9 F5 M116", "M116 is not read"),
+    ):
+        with pytest.raises(InputError, match=said):
+            parse_program(f"{head}{line}\nEND PGM A MM\n", four)
 
 
 def test_labels_repeats_and_parameters() -> None:

@@ -62,6 +62,15 @@ def test_tapping_moves_by_the_lead_of_each_turn() -> None:
         read(f"207 T {HOLE}")
 
 
+def test_the_last_way_out_of_a_thread_is_faster_by_q403() -> None:
+    """Q403, "RPM factor for retraction" (TNC 640, cycle 209)."""
+    for factor, times in (("", 1.0), (" Q403=0", 1.0), (" Q403=2.5", 2.5)):
+        found = read(f"209 T {HOLE} Q239=1.5 Q257=8 Q256=1{factor}")
+        feeds = (found.feed[found.kind == Kind.LINE] * 60)[:-1]  # the last is a move of the head
+        assert feeds[-1] == pytest.approx(times * feeds[0])
+        assert feeds[:-1] == pytest.approx(feeds[0])
+
+
 def test_a_bored_hole_is_left_off_its_wall() -> None:
     found = read(f"202 B {HOLE} Q206=100 Q208=250 Q214=2")
     assert found.end[5:8].tolist() == [[10, 19.8, -19], [10, 19.8, 3], [10, 19.8, 11]]

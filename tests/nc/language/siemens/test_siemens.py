@@ -149,7 +149,7 @@ def test_deep_holes_are_drilled_by_infeeds(out: int) -> None:
     found = read(f"G90 G0 X0 Y0 Z30 F300\nCYCLE83(20,0,2,-20,,-8,,3,0,0,1,{out})")
     back = [-7, 2][out]
     feeds = found.end[found.kind == Kind.LINE, 2].tolist()
-    assert feeds == pytest.approx([-8, -13, -16, -19, -20])
+    assert feeds == pytest.approx([-8, -13, -16, -18, -20])
     assert found.end[3, 2] == back
     assert found.end[-1, 2] == 20
     assert read("G0 Z30 F300\nCYCLE83(20,0,2,-20,,-30,,0,0,0,1,1)").end[2, 2] == -20

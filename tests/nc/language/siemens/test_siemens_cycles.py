@@ -36,6 +36,24 @@ CYCLES = {
 }
 
 
+@pytest.mark.parametrize("mode", ["", "G95 F0.2\n"])
+@pytest.mark.parametrize(("share", "infeeds"), [("0.5", "-8"), ("1", "-8"), ("", "-8"), ("0.25", "-10")])
+def test_the_first_infeed_has_its_share_of_the_feed(share: str, infeeds: str, mode: str) -> None:
+    found = read(f"{mode}CYCLE83(20,0,2,-10,,{infeeds},,3,0,0,{share},1)\nG1 X99")
+    feeds = (found.feed[found.kind == Kind.LINE] * 60).tolist()
+    assert feeds[0] == pytest.approx(200 * float(share or 1))
+    assert feeds[1:] == pytest.approx([200] * (1 + (infeeds == "-8")))
+
+
+def test_percent_of_f_counts_once() -> None:
+    found = read("OVR=50\nCYCLE840(20,0,2,,10,0,4,3,1)\nG63 Z0\nG1 X99\nG95 F0.1 X89\nG93 F2 X79\nG94 F8 X0")
+    feeds = [100, 100, 100, 100, 50, 10, 4]
+    assert (found.feed[found.kind == Kind.LINE] * 60).tolist() == pytest.approx(feeds)
+    head = "G18 G90 G71 DIAMON LIMS=2000 OVR=50\nG0 X50 Z0\nG96 S200 F0.2 M3\nG1 Z-5"
+    turned = read(head, "").feed[-1] * 60
+    assert turned == pytest.approx(0.5 * 0.2 * 200_000 / (50 * math.pi))
+
+
 @pytest.mark.parametrize("modal", [False, True])
 @pytest.mark.parametrize("cycle", CYCLES)
 def test_cycles_go_to_their_depth_and_back(cycle: str, modal: bool) -> None:

@@ -41,10 +41,8 @@ from planner.nc.reading import CL, FANUC, KLIPPER, Reading
 SIGNIFICANT = 4  # digits of a feed
 FEED_MIN = 0.01  # the lowest feed that is written [mm/s]: no control moves slower, and F0 is an error
 SAME_FEED = 1e-6  # a feed within this share of the programmed one is that [-]: rounding of lengths and times
-G93, G94, G95 = 93, 94, 95
-_F, _G = ord("F"), ord("G")
-DWELL, _SECONDS = 4.0, frozenset(b"XU")
-_PERCENT = 220.0  # M code
+DWELL, G93, G94, G95, _PERCENT = 4, 93, 94, 95, 220  # codes, the last one of M
+_F, _G, _SECONDS = ord("F"), ord("G"), frozenset(b"XU")
 _NUMBER = re.compile(NUMBER)
 STOPPING = frozenset(("M0", "M1", "M6", "M60"))  # events with a full stop of their own
 _CONTROL = {PathControl.EXACT_PATH: "G61", PathControl.EXACT_STOP: "G61.1"}
@@ -265,9 +263,8 @@ def _xy(end: FloatArray) -> str:
 
 
 def _arc(program: Program, row: int, position: FloatArray, end: FloatArray) -> str:
-    centre = program.arc_center[row] - position
-    code = "G3" if program.arc_sweep[row] > 0 else "G2"
-    return f"{code} {_xy(end)} I{flat_number(centre[0])} J{flat_number(centre[1])}"
+    centre, code = program.arc_center[row] - position, 3 if program.arc_sweep[row] > 0 else 2
+    return f"G{code} {_xy(end)} I{flat_number(centre[0])} J{flat_number(centre[1])}"
 
 
 class _Flat:

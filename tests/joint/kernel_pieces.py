@@ -50,7 +50,7 @@ def _piece(what, sizes, numbers, held, x, u, place, work, change, out, settings,
     if what == LOOK:
         looking = room.y, wide2(work.nearest, w, _THREE), wide1(work.top, w)
         put_present(sizes, group, rows, 1.0)
-        put_rows(sizes, group, held, at, control, rows, 0.0, 0.0, 0.0, looking, scratch)
+        put_rows(sizes, group, held, at, control, rows, 0.0, 0.0, settings[2], looking, scratch)
     elif what == GAPS:
         gaps(sizes, group, at, control, gap)
     elif what == NEWTON:
@@ -88,9 +88,9 @@ def _piece(what, sizes, numbers, held, x, u, place, work, change, out, settings,
 _NOTHING, _NO_END = np.zeros((0, 0, 1)), np.zeros((0, 1))
 
 
-def look(alone: Alone) -> None:
-    """Put the rows into its `work`."""
-    _piece(LOOK, *alone, _NOTHING, _NOTHING.ravel(), (0.0, 0.0, 0.0), _NO_END)
+def look(alone: Alone, least: float = 0.0) -> None:
+    """Put the rows into its `work`, with slacks of 1 and multipliers of `least`."""
+    _piece(LOOK, *alone, _NOTHING, _NOTHING.ravel(), (0.0, 0.0, least), _NO_END)
 
 
 def slopes(alone: Alone, change: Any) -> Any:

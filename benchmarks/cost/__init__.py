@@ -4,7 +4,8 @@ What was tried to make them cheaper and brought nothing, so that it is not tried
 
     the search     multipliers of the search in long steps handed on to the second one, other first slacks, starts nearer to
                    the optimum: fewer iterations on reliefs, none fewer or more on random jobs, since other rows hold
-                   the motion there; durations frozen as soon as the kinematics nearly hold: more iterations
+                   the motion there; durations frozen as soon as the kinematics nearly hold: more iterations; products of
+                   slacks and multipliers held at 0.3 of what is aimed at, not 0.1: as many (at 0.01 some windows do not end)
     windows        of 500 steps for short runs too, or overlapping by half as much: slower motions; all in lanes however few
                    lanes are filled: arcs take longer
     first motion   on a coarser grid: cheaper on long programs of short blocks, dearer on random ones, some motions slower

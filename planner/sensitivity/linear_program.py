@@ -80,8 +80,8 @@ def _assemble(program, weight, band):
 
 @njit(cache=True, error_model="numpy")
 def _step(program, work, band, mu, corrected, step):
-    """step (n,) and the multipliers' by the factor `band`, with products `mu` behind it; how far each may go: primal, dual.
-    Corrected by the products of the step before."""
+    """step (n,) and the multipliers' by the factor `band`, with products `mu` behind it, corrected by the products of the
+    step before; how far each may go, 1 / `TO_BOUNDARY` at most: primal, dual."""
     slack, z, dz, dz_1, move, weight = work
     two = program.low > -np.inf
     for r in range(len(move)):
@@ -171,9 +171,9 @@ def multipliers(program, value, enough, iterations):
         work.dz_1[:] = work.dz
         # the cube of what is left without centring (Mehrotra 1992)
         primal, dual = _step(program, work, band, (after / gap) ** 3 * gap / bounded, 1.0, step)
-        x += min(1.0, TO_BOUNDARY * primal) * step
+        x += TO_BOUNDARY * primal * step
         for side in range(2):
-            z[side] += min(1.0, TO_BOUNDARY * dual) * work.dz[side]
+            z[side] += TO_BOUNDARY * dual * work.dz[side]
         _rows_of(program, x, at)
     return best
 

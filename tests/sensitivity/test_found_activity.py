@@ -47,6 +47,28 @@ def test_it_follows_the_delivered_motion(name):
     )
 
 
+def test_it_rests_where_the_motion_stands():
+    """The program waits before its first move and before its last one."""
+    plan = made("dwells")
+    grid, seen = plan.grid, plan.trajectory
+    rests = np.flatnonzero(grid.active == grid.active_names.index("rest"))
+    lasting = np.diff(grid.t, append=seen.cycle_time)[rests]
+    assert grid.t[rests[0]] == 0.0
+    assert lasting == pytest.approx([0.2, 0.3], abs=2e-3)
+    assert np.interp(grid.t[rests] + lasting / 2.0, seen.t, seen.feed) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_of_what_holds_a_corner_the_tolerance_is_shown_as_it_costs_most():
+    """The vertex is in one step; an acceleration's price is paid in all the steps that are at it."""
+    plan = made("corner")
+    grid, names, prices = plan.grid, plan.grid.active_names, plan.prices
+    corner, y = int(np.abs(grid.s - 6.0).argmin()), names.index("acceleration.y")
+    assert grid.reached[corner, [y, names.index("tolerance")]].all()
+    in_a_step = prices.limits["acceleration.y"] * MACHINE.axes["y"].acceleration / grid.reached[:, y].sum()
+    assert prices.corners.price[0] * MACHINE.tolerance < 5.0 * in_a_step < 0.0
+    assert names[grid.active[corner]] == "tolerance"
+
+
 def test_the_limit_that_it_names_is_used():
     """Jerks, accelerations and the feed named for a step are within 2 % of the limits in the samples of the middle half of the step."""
     plan = made("corner")

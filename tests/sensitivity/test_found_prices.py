@@ -10,6 +10,7 @@ import pytest
 
 import planner
 from benchmarks.jobs import problems
+from planner import PathLimit
 from planner.commands.study.settings import Setting
 from planner.commands.study.what_if import forecast
 from planner.feedrate.solution import Status
@@ -103,12 +104,30 @@ def test_a_search_made_again_ends_elsewhere_by_so_much_that_ranges_are_as_wide()
 
 
 def test_equal_feed_and_velocity_are_worth_nothing_alone():
-    """One line along x with F at the velocity of x; of all limits together it is worth the same as with F alone."""
-    line = problems.polyline([[0, 0], [30, 0]], feed=100.0)
-    both, alone = made(line), made(line, problems.machine(velocity=200.0))
+    """One line along x with F at the velocity of x; of all limits together it is worth the same as with either alone."""
+    line, fast = (problems.polyline([[0, 0], [30, 0]], feed=feed) for feed in (100.0, 200.0))
+    both, alone, axis = made(line), made(line, problems.machine(velocity=200.0)), made(fast)
     assert abs(both.prices.feed) < 1e-3 * time_of(both)
     assert -alone.prices.feed > 0.5 * time_of(alone)
-    assert both.prices.places.limits.sum() == pytest.approx(alone.prices.places.limits.sum(), rel=1e-2)
+    assert -axis.prices.limits["velocity.x"] * 100.0 == pytest.approx(-alone.prices.feed, rel=1e-2)
+    for other in (alone, axis):
+        assert both.prices.places.limits.sum() == pytest.approx(other.prices.places.limits.sum(), rel=1e-2)
+
+
+class Slower(PathLimit):
+    """A speed that falls along y, and holds nearly all of a motion."""
+
+    name = "slower"
+
+    def velocity(self, at):
+        return 40.0 - 1.5 * at.y
+
+
+def test_a_limit_of_ones_own_has_its_least_bound_and_all_of_the_time_that_it_holds():
+    """T goes with 1/limit but for the begin and the end: the price by the least bound, at the end in y, is -T/10."""
+    line = problems.polyline([[0, 0, 0], [2, 8, 3], [3, 20, 0]], feed=90.0)
+    plan = made(line, MACHINE.with_own([Slower()]))
+    assert -10.0 * plan.prices.limits["velocity.slower"] == pytest.approx(time_of(plan), rel=0.05)
 
 
 def test_where_accelerations_take_from_the_tolerance_that_is_priced_too():

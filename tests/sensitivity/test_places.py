@@ -22,7 +22,7 @@ from planner.sensitivity.prices import MORE_LIMIT
 from planner.sensitivity.records import PlacePrices
 
 MILL = load_machine("mill")
-TENTH = 1.0 - 1.0 / (1.0 + MORE_LIMIT)
+TENTH = 1.0 - 1.0 / 1.1  # share of a time that a tenth more speed saves [-]
 
 
 def places_of(plan: Plan) -> PlacePrices:

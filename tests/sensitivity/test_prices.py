@@ -219,6 +219,17 @@ def test_on_a_path_the_tolerance_has_no_price(corner):
     assert plan.prices.saved["feed"] > 0.0
 
 
+@pytest.mark.parametrize(
+    "points", [[[0, 0], [6, 0]], [[0, 0], [6, 0], [9, 4]], [[0, 0], [6, 0], [9, 4], [4, 7]]]
+)
+def test_a_plan_on_splines_made_again_ends_elsewhere_and_one_without_any_does_not(points):
+    """By 1e-3 of the time on both sides, which is all there is of a limit that is worth nothing."""
+    plan = OptimalMethod(corner="spline").plan(problems.polyline(points, feed=90.0), MACHINE)
+    unrest = 1e-3 * plan.cycle_time if len(points) > 2 else 0.0
+    assert plan.prices.limits["velocity.z"] == 0.0
+    assert plan.prices.ranges["velocity.z"] == pytest.approx((-unrest, unrest), rel=1e-3)
+
+
 @pytest.mark.parametrize("limit", [limit for limit in LIMITS if limit.key], ids=lambda limit: limit.name)
 def test_more_of_a_limit_of_the_whole_machine_is_more_of_its_key_alone(limit) -> None:
     machine = MACHINE.model_copy(update={limit.key: 200.0})

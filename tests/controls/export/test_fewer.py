@@ -201,6 +201,24 @@ def test_numbers_units_line_ends_and_offsets(unit: tuple[str, float, int], end: 
     assert "\r" not in made.text.decode().replace("\r\n", "")
 
 
+def test_a_line_has_the_number_of_the_last_that_it_replaces() -> None:
+    """And stands where that one stood, with blanks if that one has some, and with its line end."""
+    arc = curve(20.0, 2.0, 60)
+    lines = [f"N{10 * k}{' ' * (k % 2)}X{x:.4f}{' ' * (k % 2)}Y{y:.4f}" for k, (x, y, _) in enumerate(arc)]
+    text = HEAD.replace("\n", "\r\n") + "\r\n".join([*lines, "M8"]) + "\nM2\n"
+    made = fewer(text)
+    assert made.after < 10
+    before, after = read(text), read(made.text)
+    places = dict(zip(after.line.tolist(), after.end.tolist(), strict=True))
+    moved = dict(zip(before.line.tolist(), before.end.tolist(), strict=True))
+    old = text.split("\n")
+    for number, line in enumerate(made.text.decode().split("\n"), start=1):
+        if found := re.match(r"N(\d+) ?", line):
+            (own,) = (k for k, one in enumerate(old) if one.startswith(f"{found[0]}X"))
+            assert places[number] == moved[own + 1]
+            assert line.endswith("\r") == old[own].endswith("\r")
+
+
 @pytest.mark.shows("smooth", "compared: LinuxCNC's rs274 reads the arcs, where it is installed")
 @pytest.mark.skipif(
     shutil.which("rs274") is None, reason="LinuxCNC's rs274 is missing (package linuxcnc-uspace)"

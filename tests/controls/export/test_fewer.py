@@ -19,6 +19,7 @@ from planner.machine import load_machine
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.verifier import SamePath
+from tests.machine.kinematics.five_axis import table_machine
 
 MILL = load_machine("mill")
 HEAD = "G21 G90 G17 G94 G64\nG0 X0 Y0 Z5\nF1200\nG1 Z0\n"
@@ -217,6 +218,33 @@ def test_a_line_has_the_number_of_the_last_that_it_replaces() -> None:
             (own,) = (k for k, one in enumerate(old) if one.startswith(f"{found[0]}X"))
             assert places[number] == moved[own + 1]
             assert line.endswith("\r") == old[own].endswith("\r")
+
+
+SHIFTS = (
+    "G43 H1",
+    "G43.1 Z2",
+    "G43.2 H1",
+    "G43.4 H1",
+    "G49",
+    "G52 X1",
+    "G10 L2 P1 X1",
+    "G55",
+    "G92.1",
+    "G92.2",
+    "G92.3",
+)
+
+
+@pytest.mark.parametrize("shift", SHIFTS)
+def test_the_first_line_behind_a_shift_of_the_coordinates_stays(shift: str) -> None:
+    """It says where the tool stands in the new ones; without a shift it goes as the others do."""
+    machine = table_machine(tool_length=60.0)
+    lines = "".join(f"X{x:.4f} Y{y:.4f}\n" for x, y, _ in curve(20.0, 2.0, 60))
+    for between, stays in (("M8", False), (shift, True)):
+        text = f"{HEAD}{between}\nG1 {lines}M2\n"
+        made = fewer_lines(text.encode(), parse_program(text, machine), machine, 0.01)
+        assert made.after < 10
+        assert (text.split("\n")[5].encode() in made.text) == stays
 
 
 @pytest.mark.shows("smooth", "compared: LinuxCNC's rs274 reads the arcs, where it is installed")

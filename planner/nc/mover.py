@@ -42,7 +42,7 @@ class Mover:
     feed_default: float | None  # of moves before the first F word [mm/s], or None
     splines: SplineReader
     cutter: Cutter | None = None
-    _before_cycles = NO_MOTION  # straight motion code that G80 leaves in force on Fanuc's controls
+    before_cycles = NO_MOTION  # straight motion code that G80 leaves in force on Fanuc's controls
 
     def check_unchanged(self, block: Block) -> None:
         """Raise WordFault for words that must not stand in a block while compensation is on."""
@@ -143,10 +143,10 @@ class Mover:
         """Execute the motion of a block, if it has one. Raises WordFault, and CutterFault."""
         state, code = self.state, block.g.get("motion")
         if code is not None:  # stays in force, until another one or G80
-            self._before_cycles = state.motion if state.motion in (0, 1) else self._before_cycles
+            self.before_cycles = state.motion if state.motion in (0, 1) else self.before_cycles
             state.motion = code // 10 if code <= 30 else code
         elif "cycle end" in block.g:
-            kept = state.motion if state.motion in (0, 1) else self._before_cycles
+            kept = state.motion if state.motion in (0, 1) else self.before_cycles
             state.motion, state.series = kept if state.fanuc else NO_MOTION, None
         if block.g.get("one-shot") in COVET_AXES:
             return

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.base.units import SECONDS_PER_MINUTE
+from planner.nc.codes import CYCLES
 from planner.nc.interpreter import Interpreter
 from planner.nc.language import tree
 from planner.nc.language.rows import FrameParts, require
@@ -238,8 +239,9 @@ class FanucVariables(SystemVariables):
         parts = FrameParts() if self.travel is None else self.travel.parts
         if 4201 <= number <= 4330:
             number -= 200
+        cycle = state.motion in CYCLES  # of a group of its own there
         modal: dict[int, Callable[[], float]] = {
-            4001: lambda: _motion_mode(state.motion) / 10.0,
+            4001: lambda: _motion_mode(self.interpreter.before_cycles if cycle else state.motion) / 10.0,
             4002: lambda: _PLANE[state.normal],
             4003: lambda: 90.0 if state.absolute else 91.0,
             4005: lambda: _FEED_MODES[state.feed_mode],
@@ -247,6 +249,7 @@ class FanucVariables(SystemVariables):
             4004: lambda: 23.0,
             4007: lambda: 40.0 if cutter is None else 41.0 if cutter.sign > 0 else 42.0,
             4008: lambda: 43.0 if state.tool_offset.any() else 49.0,
+            4009: lambda: state.motion / 10.0 if cycle else 80.0,
             4010: lambda: 98.0 if state.to_level else 99.0,
             4011: lambda: 50.0 + (parts.scale != 1.0).any(),
             4013: lambda: 96.0 if state.spindle.surface_speed else 97.0,

@@ -184,6 +184,19 @@ def test_arcs_share_their_filament_along_the_way(control: str, extruder: bool, w
         assert filament(out, control)[-1, :4] == pytest.approx(filament(text, control)[-1, :4], abs=1e-9)
 
 
+@pytest.mark.parametrize("size", [0.2, 0.5, 3.0])
+@pytest.mark.parametrize("mode", ["M82\nG92 E0", "M83"])
+def test_a_small_arc_has_its_filament_too(size: float, mode: str) -> None:
+    """However short it is: half a circle, at its top with half of the filament."""
+    text = f"G21 G90\n{mode}\nG0 X0 Y0\nG2 X{2 * size} Y0 I{size} J0 E0.8 F600\nM400\n"
+    job = _print(text, "klipper", extruder=False)
+    rows = filament(job.written(job.own(1e-3)[0])[0].decode(), "klipper")
+    assert rows[-1, :4] == pytest.approx([2 * size, 0, 0, 0.8], abs=1e-9)
+    angle = np.arctan2(rows[:, 1], size - rows[:, 0])
+    assert rows[:, 3] == pytest.approx(0.8 * angle / np.pi, abs=0.02)
+    assert len(rows) > 4
+
+
 def test_an_arc_whose_filament_is_not_known_is_refused() -> None:
     """A place of E feeds what the one before leaves, which nothing tells at the start; G91 makes it a step."""
     for text, said in (

@@ -19,6 +19,7 @@ from planner.machine import load_machine
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
 from planner.verifier import SamePath
+from tests.machine.kinematics.five_axis import table_machine
 
 MILL = load_machine("mill")
 HEAD = "G21 G90 G17 G94 G64\nG0 X0 Y0 Z5\nF1200\nG1 Z0\n"
@@ -199,6 +200,51 @@ def test_numbers_units_line_ends_and_offsets(unit: tuple[str, float, int], end: 
     numbers = [int(found[1]) for line in written if (found := re.match(r"N(\d+) ", line))]
     assert numbers == sorted(numbers)
     assert "\r" not in made.text.decode().replace("\r\n", "")
+
+
+def test_a_line_has_the_number_of_the_last_that_it_replaces() -> None:
+    """And stands where that one stood, with blanks if that one has some, and with its line end."""
+    arc = curve(20.0, 2.0, 60)
+    lines = [f"N{10 * k}{' ' * (k % 2)}X{x:.4f}{' ' * (k % 2)}Y{y:.4f}" for k, (x, y, _) in enumerate(arc)]
+    text = HEAD.replace("\n", "\r\n") + "\r\n".join([*lines, "M8"]) + "\nM2\n"
+    made = fewer(text)
+    assert made.after < 10
+    before, after = read(text), read(made.text)
+    places = dict(zip(after.line.tolist(), after.end.tolist(), strict=True))
+    moved = dict(zip(before.line.tolist(), before.end.tolist(), strict=True))
+    old = text.split("\n")
+    for number, line in enumerate(made.text.decode().split("\n"), start=1):
+        if found := re.match(r"N(\d+) ?", line):
+            (own,) = (k for k, one in enumerate(old) if one.startswith(f"{found[0]}X"))
+            assert places[number] == moved[own + 1]
+            assert line.endswith("\r") == old[own].endswith("\r")
+
+
+SHIFTS = (
+    "G43 H1",
+    "G43.1 Z2",
+    "G43.2 H1",
+    "G43.4 H1",
+    "G49",
+    "G52 X1",
+    "G10 L2 P1 X1",
+    "G55",
+    "G92.1",
+    "G92.2",
+    "G92.3",
+)
+
+
+@pytest.mark.parametrize("shift", SHIFTS)
+def test_the_first_line_behind_a_shift_of_the_coordinates_stays(shift: str) -> None:
+    """It says where the tool stands in the new ones; without a shift it goes as the others do."""
+    machine = table_machine(tool_length=60.0)
+    lines = "".join(f"X{x:.4f} Y{y:.4f}\n" for x, y, _ in curve(20.0, 2.0, 60))
+    for between, stays in (("M8", False), (shift, True)):
+        text = f"{HEAD}{between}\nG1 {lines}M2\n"
+        made = fewer_lines(text.encode(), parse_program(text, machine), machine, 0.01)
+        assert made.after < 10
+        assert (text.split("\n")[5].encode() in made.text) == stays
 
 
 @pytest.mark.shows("smooth", "compared: LinuxCNC's rs274 reads the arcs, where it is installed")

@@ -77,6 +77,18 @@ def test_straight_rows_at_the_cycle_of_a_drive(tmp_path: Path, motion: Trajector
     assert far(places, motion) == pytest.approx(miss, abs=2e-8)
 
 
+@pytest.mark.parametrize("periods", [1, 2, 3, 4, 7])
+def test_rows_begin_and_end_with_the_motion_and_none_comes_twice(
+    tmp_path: Path, motion: Trajectory, periods: int
+) -> None:
+    """However many setpoints there are behind the last whole cycle: none, one, or more."""
+    write_table(tmp_path, motion, Table(cycle=periods * motion.dt))
+    t = table(tmp_path)["t"]
+    assert (t[0], t[-1]) == pytest.approx((motion.t[0], motion.t[-1]), abs=1e-9)
+    assert np.diff(t).min() > 0.0
+    assert np.diff(t).max() <= periods * motion.dt + 1e-9
+
+
 @pytest.mark.shows("export-twincat", "exact: columns of the file")
 def test_tables_of_a_time_and_a_position(tmp_path: Path, motion: Trajectory) -> None:
     _, miss = write_table(tmp_path, motion, Table(kind="twincat", within=1e-2))

@@ -271,6 +271,8 @@ def test_a_tilting_table_has_its_kinematics(tmp_path: Path) -> None:
         (-50.8, 38.1, -254)
     )
     assert found.machine.axes["c"].velocity == 45.0, "joint 4 moves c"
+    alone = imported(tmp_path, TILTING.replace(" gui.y", "")).machine
+    assert alone.kinematics == kinematics, "a signal may have one pin only"
     assert said(found, "codes that this machine has of its own are left out: M6 (REMAP)")
     assert not said(found, "begins with the tool centre point on")
     on = imported(tmp_path, TILTING.replace(" sparm=identityfirst", ""))

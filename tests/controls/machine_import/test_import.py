@@ -10,6 +10,7 @@ import pytest
 from planner.base.errors import InputError
 from planner.controls.machine_import.convert import RAMP_TIME, Imported, import_machine
 from planner.machine import load_machine, machine_from_dict
+from planner.nc.reader import parse_program
 from tests.commands.command_line import run
 
 SAMPLES = Path("/usr/share/doc/linuxcnc/examples/sample-configs/sim/axis")  # Debian's package linuxcnc-uspace
@@ -169,6 +170,16 @@ def test_reprapfirmware_has_the_same_commands_but_velocities_per_minute(tmp_path
     )
     assert found.machine.axes["x"].acceleration == 400.0
     assert any("RepRapFirmware" in said for said in found.assumed)
+
+
+SHOWN = GRBL, KLIPPER, MARLIN, MARLIN.replace("G21", "G20"), MARLIN + "M566 X600 Y600\n"
+
+
+@pytest.mark.parametrize("text", SHOWN, ids=["grbl", "klipper", "marlin", "inches", "reprapfirmware"])
+def test_programs_of_other_controls_begin_in_mm(tmp_path: Path, text: str) -> None:
+    """Whatever unit the settings are printed in: only LinuxCNC has a unit of the machine."""
+    program = parse_program("G1 X2 F60\n", imported(tmp_path, text).machine)
+    assert (program.end[0, 0], program.feed[0]) == (2.0, 1.0)
 
 
 def test_limits_can_be_given_and_replace_those_of_the_settings(tmp_path: Path) -> None:

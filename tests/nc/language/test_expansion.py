@@ -11,6 +11,7 @@ from planner.base.errors import InputError
 from planner.nc.language import run
 from planner.nc.program import Kind
 from planner.nc.reader import interpret, parse_program, read_program
+from planner.nc.reading import Reading
 
 # --- files, places, notes -------------------------------------------------------------------------------------------------------
 
@@ -53,6 +54,15 @@ def test_a_program_that_computes_nothing_is_read_as_before() -> None:
         program = parse_program(text)
         assert program.expansion is None
         assert len(program) == 1
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc"])
+@pytest.mark.parametrize("end", ["M2", "M30", "N9 M30 (end)"])
+def test_nothing_behind_the_end_is_computed(dialect: str, end: str) -> None:
+    """Also a value that there is not."""
+    for behind in ("X[SQRT[0-1]]", "#2=1\nX[1/0]"):
+        text = f"G21 F100\n#1=5\nG1 X#1\nX2\n{end}\nX7\n{behind}\nX8\n"
+        assert parse_program(text, reading=Reading(dialect=dialect)).end[:, 0].tolist() == [5.0, 2.0]
 
 
 # --- where programs fail --------------------------------------------------------------------------------------------------------

@@ -270,7 +270,7 @@ class Definitions(Flow):
                 continue
             elif code in tables.AT_END and self.file:
                 after.append(Return(block.place))
-            elif code in (0, 1, 5, 9, *tables.AT_END):
+            elif code in (0, 1, 5, 6, 9, *tables.AT_END):
                 after.append(as_it_is)
             elif is_of_the_builder(code):
                 # planned and flat programs do not have it: whoever read them would take it for another

@@ -6,7 +6,7 @@ import pytest
 from language_programs import same
 
 from planner.base.errors import InputError
-from planner.machine import DialectData, Machine
+from planner.machine import DialectData, Machine, ToolData, load_machine
 from planner.nc.reader import parse_program
 from planner.nc.reading import Reading
 from planner.nc.writer import flat_program
@@ -86,3 +86,24 @@ def test_the_dialect_decides() -> None:
     linuxcnc, fanuc = (parse_program(text, reading=Reading(dialect=name)) for name in ("linuxcnc", "fanuc"))
     assert linuxcnc.end[0, 0] == 1
     assert fanuc.end[0, 0] == 3
+
+
+# Codes in force by their groups, and words (operator's manual of series 0i, system variables 4001 to 4130).
+MODAL = {
+    "G0 X1": {4001: 0}, "G1 X1": {4001: 1}, "G2 X2 I1": {4001: 2, 4002: 17}, "G3 X2 I1": {4001: 3}, "G18": {4002: 18},
+    "G19": {4002: 19}, "G91": {4003: 91}, "X1": {4003: 90, 4006: 21, 4007: 40, 4008: 49, 4009: 80}, "G95 S50": {4005: 95},
+    "G94": {4005: 94}, "G43 H2": {4008: 43, 4111: 2}, "G43 H2\nG49": {4008: 49}, "G0 X1\nG81 Z-1 R1": {4001: 0, 4009: 81},
+    "G73 Z-1 R1 Q1": {4001: 1, 4009: 73}, "G81 Z-1 R1\nG80": {4001: 1, 4009: 80}, "G99": {4010: 99}, "G98": {4010: 98},
+    "G55": {4014: 55}, "G61": {4015: 61}, "G64": {4015: 64}, "M8": {4113: 8}, "S500": {4119: 500}, "T3": {4120: 3},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", MODAL)
+@pytest.mark.parametrize("block", [0, 200])
+def test_a_program_may_ask_for_what_is_in_force(words: str, block: int) -> None:
+    machine = load_machine("mill").model_copy(update={"tools": {"2": ToolData(length=5.0)}})
+    for number, value in MODAL[words].items():
+        program = parse_program(
+            f"%\nO1\nG21 G90 G1 X0 F100\n{words}\n#1=#{number + block}\nG90 G1 X#1 F1\nM30\n%\n", machine
+        )
+        assert program.end[-1, 0] == value

@@ -153,6 +153,16 @@ def test_slots_lie_where_they_are_asked_for() -> None:
     assert angle[(angle > 0)].max() == pytest.approx(100, abs=0.1)
 
 
+@pytest.mark.parametrize(("where", "middle"), [(0, 0.0), (1, 25.0), (2, 18.0), (3, -18.0), (4, -25.0)])
+def test_where_the_tool_stands_in_a_slot(where: int, middle: float) -> None:
+    """Q367: 0 the middle, 1 the left end, 2 and 3 the centres of the left and the right arc, 4 the right end (TNC 640, cycle 253)."""
+    found = read(f"253 S {POCKET.format(turn=1)} Q218=50 Q219=14 Q374=30 Q367={where} Q215=1")
+    points, _ = sampled(found, 0.05)
+    low = points[points[:, 2] < 0]
+    along = (low[:, 0] - 10) * math.cos(math.radians(30)) + (low[:, 1] - 20) * math.sin(math.radians(30))
+    assert [along.min(), along.max()] == pytest.approx([middle - 20, middle + 20], abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("cycle", "said"),
     [

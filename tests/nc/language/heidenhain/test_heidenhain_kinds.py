@@ -100,6 +100,27 @@ def test_the_cycle_is_called_at_each_place_of_a_pattern(pattern: str) -> None:
     assert program.feed[program.kind == Kind.LINE].tolist() == [5.0] * len(low)
 
 
+@pytest.mark.parametrize("codes", [(0, 1, 5, 6, 9), (3, 4, 8, 13, 14)])
+def test_a_switch_acts_before_or_behind_the_move_of_its_block(codes: tuple[int, ...]) -> None:
+    """M0, M1, M5, M6 and M9 at the end of their block, M3, M4, M8, M13 and M14 at its beginning (manuals from TNC 155 on)."""
+    for code in codes:
+        program = read(f"L X+1 F100\nL X+5 M{code}\nL X+9")
+        stands = {float(program.end[event.block - 1, 0]) for event in program.events}
+        assert stands == {5.0 if 5 in codes else 1.0}
+
+
+NOTHING = "90 102 105 106 107 108 111 113 117 120 127 129 141 142 145 148 149 150"
+
+
+@pytest.mark.parametrize("code", NOTHING.split())
+def test_codes_that_move_nothing_are_known_and_left_out(code: str) -> None:
+    """What they would end is refused where it begins, or they are of monitoring and messages (TNC 640, overview of M functions)."""
+    program = read(f"L X+1 F100 M{code}\nM{code}\nL X+9")
+    assert program.end[:, 0].tolist() == [1.0, 9.0]
+    assert not len(program.events)
+    assert not program.assumptions
+
+
 def test_m89_calls_the_cycle_at_every_place_up_to_m99() -> None:
     program = read(f"{HOLE}L X+1 Y+1 R0 FMAX M89\nL X+2 FMAX\nL X+3 FMAX M99\nL X+4 FMAX")
     low = program.end[program.end[:, 2] == program.end[:, 2].min()]

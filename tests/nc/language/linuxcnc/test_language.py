@@ -47,6 +47,9 @@ EXAMPLES = [
     # what the control knows
     "G20\nF10\nG1 X1\nX[#<_x>*2] Y#<_feed> Z#<_metric>\nG21\nX#<_y> Z#<_metric>\nG92 X5\nX#5420 Y#<_coord_system>\nM3 S500\n"
     "X#<_rpm> Y#<_spindle_on>\nG91 X1\nX#<_incremental>",
+    # the motion code in force, in tenths
+    "G0 X1\n#1=#<_motion_mode>\nG1 X2\n#2=#<_motion_mode>\nG3 X4 I1\n#3=#<_motion_mode>\nG81 X5 Z-1 R1\n#4=#<_motion_mode>\n"
+    "G80\n#5=#<_motion_mode>\nG1 X#1 Y#2 Z#3\nX#4 Y#5",
     # saved modes (LinuxCNC does not restore a feed across a change of units)
     "G91 F50\nM70\nG90 F100\nG1 X10\nM72\nG1 X1\nG20\nM70\nG21\nF80 G1 X3\nM72\nF9\nG1 X1\no50 sub\nM73\nG90 G1 X2\no50 endsub\n"
     "o50 call\nG1 X1",

@@ -108,17 +108,21 @@ def test_extremes_between_places_are_those_of_the_motion(seed):
 
 
 @pytest.mark.shows("between", "exact: extremes of cubics")
-def test_the_peak_of_a_velocity_between_two_places_is_found_exactly():
-    h, jerk = 0.01, 4e4
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4, 0.6, 0.9])
+def test_the_peak_of_a_velocity_between_two_places_is_found_exactly(share):
+    """Wherever in a part it lies; y goes on evenly."""
+    h, jerk, even = 0.01, 4e4, 5.0
+    when = (PARTS // 2 + share) / PARTS * h
     motion = Cubics(
         np.array([h]),
         np.array([[-jerk, 0.0, 0.0]]),
-        np.array([[0.0] * 3, [20.0, 0, 0], [jerk * h / 2, 0, 0]]),
+        np.array([[0.0] * 3, [20.0, even, 0], [jerk * when, 0, 0]]),
     )
     found, known, _ = looked(motion, np.array([0.0, h * (1 - 1e-12)]))
-    peak = 20.0 + (jerk * h / 2) ** 2 / (2 * jerk)
+    peak = 20.0 + jerk * when**2 / 2
     assert found.velocity[1, 0] == pytest.approx(peak, rel=1e-12)
-    assert peak <= found.speed[1] <= peak * (1 + WITHIN)
+    speed = np.hypot(peak, even)
+    assert speed * (1 - 1e-12) <= found.speed[1] <= speed * (1 + WITHIN)
     assert not known[UNKNOWN]
 
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from motions import Asked, Moves, along, helix, machine, polyline, rest_to_rest, sample
+from motions import Asked, Moves, along, helix, machine, polyline, rest_to_rest, sample, straight
 
 import planner
 from planner.motion.trajectory import Trajectory
@@ -185,6 +185,21 @@ def test_a_motion_on_cubics_is_known_exactly():
     assert 0.0 < verdict.claims.open_mm < 0.01 * M.tolerance
     assert verdict.limits["acceleration.x"].ratio == pytest.approx(1.0, abs=1e-9)
     assert verdict.limits["feed"].ratio == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 7])
+def test_a_peak_above_f_is_seen_however_many_places_are_read_at_once(samples, monkeypatch):
+    """The speed is largest within a piece, on the second of two blocks; the first one has more F."""
+    length, first = 4.0, 1.0
+    path = Moves().line(first, feed=80.0).line(length, feed=40.0).toolpath(M)
+    motion = along(*straight((0, 0, 0), (length, 0, 0)), rest_to_rest(length, 1e3, 2000.0, 2e5))
+    ramp = motion[0] / 2.0 - 0.01  # with the jerk j the acceleration a takes a/j = 10 ms
+    asked = InPieces(motion, M.dt, begins=(0.0, 0.01, ramp, motion[0] - ramp, motion[0] - 0.01))
+    whole = verify(sample(motion, M.dt), path, M, motion=asked).limits["feed"]
+    peak = motion[1](np.array([motion[0] / 2.0]))[1][0, 0]
+    assert peak * (1.0 - 1e-12) <= whole.ratio * 40.0 <= peak * (1.0 + WITHIN)
+    monkeypatch.setattr("planner.verifier.stream.BLOCK_SAMPLES", samples)
+    assert verify(sample(motion, M.dt), path, M, motion=asked).limits["feed"].ratio == whole.ratio
 
 
 def test_one_whose_pieces_are_no_cubics_is_sampled():

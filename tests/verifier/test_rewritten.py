@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -30,7 +31,10 @@ def compared(one: Moves, other: Moves, allowed: float) -> SamePath:
 @pytest.mark.parametrize("back", [0.5, 3.0])
 def test_a_way_back_along_a_line_is_half_of_it_off(back: float, turned: bool) -> None:
     """Nearness alone would see nothing: whoever runs the line straight waits in the middle of what the other runs back."""
-    straight, there = through(np.array([[0.0, 0], [10, 0]])), through(np.array([[0.0, 0], [8, 0], [8 - back, 0], [10, 0]]))
+    straight, there = (
+        through(np.array([[0.0, 0], [10, 0]])),
+        through(np.array([[0.0, 0], [8, 0], [8 - back, 0], [10, 0]])),
+    )
     one, other = (there, straight) if turned else (straight, there)
     assert compared(one, other, 0.49 * back).fault == "the paths are further apart"
     found = compared(one, other, 0.55 * back)
@@ -65,9 +69,7 @@ def distance_in_order(a: FloatArray, b: FloatArray) -> float:
 
 def finely(points: FloatArray, step: float) -> FloatArray:
     """Points of a polyline, its vertices too, no further apart than `step`."""
-    parts = [
-        np.linspace(a, b, 1 + math.ceil(np.linalg.norm(b - a) / step)) for a, b in zip(points, points[1:], strict=False)
-    ]
+    parts = [np.linspace(a, b, 1 + math.ceil(np.linalg.norm(b - a) / step)) for a, b in pairwise(points)]
     return np.vstack(parts)
 
 
@@ -81,4 +83,6 @@ def test_of_any_two_polylines_it_is_that_of_points_close_to_each_other(seed: int
     allowed = 1.5 * close
     found = compared(through(one), through(other), allowed)
     assert close - step <= found.within <= close + (FINE + 2.0 * FLAT) * allowed
-    assert compared(through(one), through(other), 0.98 * (close - step)).fault == "the paths are further apart"
+    assert (
+        compared(through(one), through(other), 0.98 * (close - step)).fault == "the paths are further apart"
+    )

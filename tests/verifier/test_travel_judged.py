@@ -95,7 +95,9 @@ def test_an_axis_that_turns_on_has_no_end_of_its_travel() -> None:
     passed = []
     for wrapped, last in ((True, 10), (False, 370)):
         far, short = (
-            reaching({}).model_copy(update={"axes": MILL.axes | {"a": Axis(**axis, travel_max=end, wrapped=wrapped)}})
+            reaching({}).model_copy(
+                update={"axes": MILL.axes | {"a": Axis(**axis, travel_max=end, wrapped=wrapped)}}
+            )
             for end in (720.0, 360.0)
         )
         text = f"G21 G90 F3000\nG1 X5 A350\nX10 A{last}\n"

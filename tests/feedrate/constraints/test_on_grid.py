@@ -48,7 +48,9 @@ def test_where_f_changes_the_smaller_one_counts_on_either_side():
     grid = grid_of(program, problems.machine())
     (cap,) = FEED.at_points(grid)
     x = grid.samples.position[:, 0]
-    expected = np.array([40.0 if 10.0 - 1e-9 <= at <= 20.0 + 1e-9 else feeds[int(at / 10.0)] for at in x[:-1]])
+    expected = np.array(
+        [40.0 if 10.0 - 1e-9 <= at <= 20.0 + 1e-9 else feeds[int(at / 10.0)] for at in x[:-1]]
+    )
     assert np.isclose(x[:, None], [10.0, 20.0]).any(axis=0).all(), "both changes are at points"
     np.testing.assert_allclose(np.sqrt(cap.feed_sq[:-1]), expected)
 

@@ -30,7 +30,7 @@ HYSTERESIS = 0.05  # H [pulses]; the rounding of coordinates is 1e-10 of a pulse
 PULSES_MAX = 2e8  # more pulses than this are refused: in memory and in a file they fill gigabytes
 GAP_MIN = 1e-12  # [s] the rounding of times; two pulses are never closer
 SOLVE_STEPS = 60  # Newton on a monotone cubic, safeguarded by bisection
-TIME_ROUNDING = 1e-13  # of a period: where a pulse is on it [-]
+TIME_ROUNDING, RATE_ROUNDING = 1e-13, 1e-6  # of a period: where a pulse is on it; of a rate of pulses [-]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -111,14 +111,14 @@ def overrun(trains: tuple[AxisPulses, ...], drive: Drive) -> list[str]:
     said = []
     for train in trains:
         gap = np.diff(train.time)
-        if not len(gap) or gap.min() >= drive.gap * (1.0 - TIME_ROUNDING):
+        if not len(gap) or gap.min() >= drive.gap * (1.0 - RATE_ROUNDING):
             continue
         k = int(gap.argmin())
         rate = 1.0 / max(gap[k], GAP_MIN)
         text = f"axis {train.axis}, line {train.line[k]}, t = {train.time[k]:.6g} s: two pulses within {1e6 * gap[k]:.4g} us"
-        if drive.frequency_max and rate > drive.frequency_max * (1.0 + TIME_ROUNDING):
+        if drive.frequency_max and rate > drive.frequency_max * (1.0 + RATE_ROUNDING):
             text += f", {rate:.6g} per second; the drive takes {drive.frequency_max:.6g}"
-        if drive.width and gap[k] < 2.0 * drive.width:
+        if drive.width and gap[k] < 2.0 * drive.width * (1.0 - RATE_ROUNDING):
             text += f"; high and low for {1e6 * drive.width:.4g} us each, a pulse needs {2e6 * drive.width:.4g} us"
         said.append(text + ": fewer steps per mm, or a lower velocity of this axis in the machine file")
     return said

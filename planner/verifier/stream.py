@@ -152,9 +152,9 @@ class Watch:
         self._travelled = look_at_axes(block, limits, worst, found, sure=bool(sure))
         # where the block changes the larger F counts, and where the motion is lost none
         feed = np.where(place.last >= 0, place.feed_max, np.inf)
+        before, self._feed_before = self._feed_before, float(feed[-1])
         feed[:skip] = np.inf
-        feed[skip:] = np.maximum(feed[skip:], np.append(self._feed_before, feed[skip:-1]))
-        self._feed_before = float(feed[-1])
+        feed[skip:] = np.maximum(feed[skip:], np.append(before, feed[skip:-1]))
         worst.take(GROUPS * axes + FEED, found.speed[:, None], feed[:, None], COLUMN, block)
         return found.cut
 

@@ -12,6 +12,7 @@ from benchmarks.jobs import problems
 from planner.base.arrays import FloatArray
 from planner.corners.bezier import BezierCorner
 from planner.corners.sharing import share_legs
+from planner.corners.smooth import SmoothPath
 
 
 def chain(seed: int, corners: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -83,3 +84,21 @@ def test_paper_002s_corner_1_keeps_its_reach_on_a_short_leg():
     path = smooth_path(problems.five_points(), problems.five_points_machine(), BezierCorner(sigma2=1.0))
     assert path.legs.length[0] == pytest.approx(0.5)
     assert path.d[1] == pytest.approx(0.292, abs=5e-4)  # L/2 would be 0.25
+
+
+def test_what_two_corners_leave_of_a_leg_is_taken_too_where_it_is_next_to_nothing():
+    """Corners that turn by 60 and by 90 degrees, on legs that are longer than what both want by one part in 50,000."""
+    heading = np.cumsum(np.deg2rad([0.0, 60.0, -90.0, 60.0, -90.0]))
+    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+
+    def path_of(length: FloatArray) -> SmoothPath:
+        points = np.vstack([[0.0, 0.0], np.cumsum(length[:, None] * along, axis=0)])
+        return smooth_path(problems.polyline(points), problems.machine(), BezierCorner())
+
+    wanted = path_of(np.full(5, 100.0)).d
+    length = (wanted[:-1] + wanted[1:]) * (1.0 + 2e-5)
+    length[[0, -1]] = 100.0
+    path = path_of(length)
+    assert (path.scale > 1.0).any(axis=0).all(), "behind corners, and before them"
+    free = path.legs.length - path.d_out[:-1] - path.d_in[1:]
+    np.testing.assert_allclose(free[1:-1], 0.0, atol=1e-12)

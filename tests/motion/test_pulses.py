@@ -197,6 +197,20 @@ def test_what_a_drive_cannot_take_is_named():
     assert "a pulse needs 40 us" in fault
 
 
+@pytest.mark.parametrize("seconds", [0.25, 40.0])
+def test_a_drive_at_its_largest_frequency_is_told_of_the_width_alone(seconds):
+    """Pulses of 4000 per second, evenly: the rounding of their times is no excess, late in a job either."""
+    t = np.arange(round(seconds * 100.0) + 1) * 0.01
+    (train,) = pulses_of(trajectory(t, np.outer(t, [10.0, 0.0])), {"x": 400.0})
+    assert overrun((train,), Drive(frequency_max=4000.0, width=125e-6)) == []
+    assert overrun((train,), Drive(frequency_max=3999.9)) != []
+    (fault,) = overrun((train,), Drive(frequency_max=4000.0, width=200e-6))
+    assert "a pulse needs 400 us" in fault
+    assert "the drive takes" not in fault
+    (fault,) = overrun((train,), Drive(frequency_max=3000.0, width=125e-6))
+    assert "a pulse needs" not in fault
+
+
 @pytest.mark.parametrize("drive", [{"frequency_max": 0.0}, {"width": -1.0}, {"frequency_max": np.inf}])
 def test_drives_that_make_no_sense_are_refused(drive):
     with pytest.raises(InputError, match=next(iter(drive))):

@@ -72,6 +72,16 @@ def test_a_joint_is_passed_so_early_that_those_after_it_are_passed_within_their_
     assert times[1] < times[2] < 2.5
 
 
+def test_a_joint_that_is_missed_the_second_time_is_not_taken_for_the_first_time() -> None:
+    """Twice around a square: at its beginning the second round leaves out a corner by more than the tolerance."""
+    square = np.array([[10.0, 0.0], [10.0, 10.0], [0.0, 10.0], [0.0, 0.0]])
+    places = np.vstack([[[0.0, 0.0]], square, square])
+    text = "G21 G90 F600 G64 P0.05\n" + "".join(f"G1 X{x:g} Y{y:g}\n" for x, y in places[1:]) + "M2\n"
+    toolpath = toolpath_from_program(parse_program(text, MACHINE), MACHINE)
+    places[5] = 9.8, 0.2
+    np.testing.assert_allclose(passing_times(motion_through(places), toolpath), np.arange(9), atol=0.1)
+
+
 def test_a_joint_between_two_samples_is_passed_between_their_times() -> None:
     """On a line the time is that of the chord at the place itself, not that of a sample."""
     text = "G21 G90 F600 G64 P0.01\nG1 X0.3\nG1 X0.55\nG1 X1\nM2\n"

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from motions import Asked, Moves, along, helix, machine, polyline, rest_to_rest, sample
+from motions import Asked, Moves, along, helix, machine, polyline, rest_to_rest, sample, straight
 
 import planner
 from planner.motion.trajectory import Trajectory
@@ -108,17 +108,21 @@ def test_extremes_between_places_are_those_of_the_motion(seed):
 
 
 @pytest.mark.shows("between", "exact: extremes of cubics")
-def test_the_peak_of_a_velocity_between_two_places_is_found_exactly():
-    h, jerk = 0.01, 4e4
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4, 0.6, 0.9])
+def test_the_peak_of_a_velocity_between_two_places_is_found_exactly(share):
+    """Wherever in a part it lies; y goes on evenly."""
+    h, jerk, even = 0.01, 4e4, 5.0
+    when = (PARTS // 2 + share) / PARTS * h
     motion = Cubics(
         np.array([h]),
         np.array([[-jerk, 0.0, 0.0]]),
-        np.array([[0.0] * 3, [20.0, 0, 0], [jerk * h / 2, 0, 0]]),
+        np.array([[0.0] * 3, [20.0, even, 0], [jerk * when, 0, 0]]),
     )
     found, known, _ = looked(motion, np.array([0.0, h * (1 - 1e-12)]))
-    peak = 20.0 + (jerk * h / 2) ** 2 / (2 * jerk)
+    peak = 20.0 + jerk * when**2 / 2
     assert found.velocity[1, 0] == pytest.approx(peak, rel=1e-12)
-    assert peak <= found.speed[1] <= peak * (1 + WITHIN)
+    speed = np.hypot(peak, even)
+    assert speed * (1 - 1e-12) <= found.speed[1] <= speed * (1 + WITHIN)
     assert not known[UNKNOWN]
 
 
@@ -181,6 +185,21 @@ def test_a_motion_on_cubics_is_known_exactly():
     assert 0.0 < verdict.claims.open_mm < 0.01 * M.tolerance
     assert verdict.limits["acceleration.x"].ratio == pytest.approx(1.0, abs=1e-9)
     assert verdict.limits["feed"].ratio == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 7])
+def test_a_peak_above_f_is_seen_however_many_places_are_read_at_once(samples, monkeypatch):
+    """The speed is largest within a piece, on the second of two blocks; the first one has more F."""
+    length, first = 4.0, 1.0
+    path = Moves().line(first, feed=80.0).line(length, feed=40.0).toolpath(M)
+    motion = along(*straight((0, 0, 0), (length, 0, 0)), rest_to_rest(length, 1e3, 2000.0, 2e5))
+    ramp = motion[0] / 2.0 - 0.01  # with the jerk j the acceleration a takes a/j = 10 ms
+    asked = InPieces(motion, M.dt, begins=(0.0, 0.01, ramp, motion[0] - ramp, motion[0] - 0.01))
+    whole = verify(sample(motion, M.dt), path, M, motion=asked).limits["feed"]
+    peak = motion[1](np.array([motion[0] / 2.0]))[1][0, 0]
+    assert peak * (1.0 - 1e-12) <= whole.ratio * 40.0 <= peak * (1.0 + WITHIN)
+    monkeypatch.setattr("planner.verifier.stream.BLOCK_SAMPLES", samples)
+    assert verify(sample(motion, M.dt), path, M, motion=asked).limits["feed"].ratio == whole.ratio
 
 
 def test_one_whose_pieces_are_no_cubics_is_sampled():

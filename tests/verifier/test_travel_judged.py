@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planner
-from planner.machine import Machine, load_machine
+from planner.machine import Axis, Machine, load_machine
 from planner.planning.job.at_tip import judged
 from planner.planning.job.plan import Plan
 from planner.verifier import Verdict
 from tests.commands.command_line import run
-from tests.nc.test_travel import reaching
+from tests.nc.test_travel import MILL, reaching
 
 JOB = "G21 G90 G64 P0.02 F3000\nG0 X10 Y5\nG1 X40\nG3 X40 Y25 J10\nG1 X10 Y20\nY5\n"
 
@@ -87,6 +87,25 @@ def test_an_axis_that_starts_beyond_goes_no_further() -> None:
     assert on(reaching({}, z=(5.0, 60.0))).passed, "z stands still"
     away = planner.plan(planner.read_program(text="G21 G90 F600\nG1 X10 Z-1\n"), method="kinematic")
     assert not on(reaching({}, z=(5.0, 60.0)), away).passed
+
+
+def test_an_axis_that_turns_on_has_no_end_of_its_travel() -> None:
+    """Past 360 degrees it stands where it stood a turn before; one that does not turn on has left its travel there."""
+    axis = {"velocity": 100, "acceleration": 1000, "jerk": 1e5, "travel_min": 0.0}
+    passed = []
+    for wrapped, last in ((True, 10), (False, 370)):
+        far, short = (
+            reaching({}).model_copy(
+                update={"axes": MILL.axes | {"a": Axis(**axis, travel_max=end, wrapped=wrapped)}}
+            )
+            for end in (720.0, 360.0)
+        )
+        text = f"G21 G90 F3000\nG1 X5 A350\nX10 A{last}\n"
+        made = planner.plan(planner.read_program(text=text, machine=far), far, method="stop")
+        assert made.trajectory is not None
+        assert np.rad2deg(made.trajectory.position[-1, -1] / made.trajectory.radius) == pytest.approx(370.0)
+        passed.append(on(short, made).passed)
+    assert passed == [True, False]
 
 
 def test_joints_are_judged_where_the_tool_centre_point_is_on() -> None:

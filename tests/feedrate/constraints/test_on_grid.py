@@ -13,7 +13,7 @@ from benchmarks.judge.setpoints import trajectory_of
 from planner.corners.bezier import BezierCorner
 from planner.corners.smooth import round_corners
 from planner.feedrate.constraints.assemble import CURVATURE_MARGIN, bounds_of
-from planner.feedrate.constraints.limits import LIMITS, VELOCITY, Limits
+from planner.feedrate.constraints.limits import ACCELERATION, FEED, LIMITS, VELOCITY, Limits
 from planner.feedrate.constraints.on_grid import OnGrid, interval_sides, remaining_budget
 from planner.feedrate.sampling.samples import sample_path
 from planner.geometry.build import toolpath_from_program
@@ -40,6 +40,42 @@ def test_between_the_points_of_a_coarse_grid_no_axis_is_faster_than_its_velocity
     turned = np.maximum(np.abs(np.sin(phi)), np.abs(np.cos(phi)))
     assert (np.sqrt(np.interp(along, s, points)) * turned).max() > 1.01 * fastest
     assert (np.sqrt(np.interp(along, s, allowed)) * turned).max() <= fastest * (1 + 1e-9)
+
+
+def test_where_f_changes_the_smaller_one_counts_on_either_side():
+    feeds = np.array([100.0, 40.0, 80.0])
+    program = problems.polyline([[0, 0], [10, 0], [20, 0], [30, 0]], feed=feeds)
+    grid = grid_of(program, problems.machine())
+    (cap,) = FEED.at_points(grid)
+    x = grid.samples.position[:, 0]
+    expected = np.array(
+        [40.0 if 10.0 - 1e-9 <= at <= 20.0 + 1e-9 else feeds[int(at / 10.0)] for at in x[:-1]]
+    )
+    assert np.isclose(x[:, None], [10.0, 20.0]).any(axis=0).all(), "both changes are at points"
+    np.testing.assert_allclose(np.sqrt(cap.feed_sq[:-1]), expected)
+
+
+def test_beside_rotary_axes_f_is_the_speed_of_x_and_y_on_a_rounded_corner_too():
+    """Before the corner a turns much, behind it little: the curve has other parts in both than its blocks."""
+    axis = problems.machine().axes["x"]
+    machine = problems.machine(axes=dict.fromkeys("xyza", axis), tolerance=0.5)
+    grid = grid_of(parse_program("G21 G90 G64 F600\nG1 X20 A60\nG1 Y20 A65\n", machine), machine)
+    (cap,) = FEED.at_points(grid)
+    assert (grid.samples.element[grid.right] < 0).sum() > 5
+    cutting = np.sqrt(cap.feed_sq) * np.linalg.norm(grid.samples.d1[:, :3], axis=1)
+    np.testing.assert_array_less(cutting, 10.0 * (1.0 + 1e-9))
+    assert cutting[[0, -1]] == pytest.approx(10.0)
+
+
+def test_from_one_arc_to_its_mirror_image_the_acceleration_steps_by_both():
+    """An S: v^2/R on one side of the joint, and as much to the other side behind it; where a line meets an arc, once."""
+    radius, most = 10.0, 2000.0
+    program = "G21 G17 F60000\nG1 X20\nG3 X30 Y10 J10\nG2 X40 Y20 I10\n"
+    grid = grid_of(parse_program(program), problems.machine(acceleration=most))
+    allowed = np.min([cap.feed_sq for cap in ACCELERATION.at_jumps(grid)], axis=0)
+    for place, size in (([20.0, 0.0], 1.0 / radius), ([30.0, 10.0], 2.0 / radius)):
+        here = np.isclose(grid.samples.position[:, :2], place).all(axis=1)
+        assert allowed[here] == pytest.approx(most / size)
 
 
 @pytest.mark.parametrize("theta", [0.4, 1.3, 2.4])

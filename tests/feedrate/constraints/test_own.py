@@ -11,6 +11,11 @@ import pytest
 import planner
 from planner import JointLimit, PathLimit
 from planner.base.errors import InputError
+from planner.corners.bezier import BezierCorner
+from planner.corners.smooth import round_corners
+from planner.feedrate.constraints.assemble import feedrate_problem
+from planner.feedrate.sampling.samples import sample_path
+from planner.geometry.build import toolpath_from_program
 from planner.machine import load_machine
 from planner.nc.reader import read_program
 from planner.verifier import Given, verify
@@ -78,6 +83,21 @@ def job(tmp_path_factory):
 
 def _ratios(plan, name):
     return {key.partition(".")[0]: c.ratio for key, c in plan.verdict.limits.items() if key.endswith(name)}
+
+
+def test_to_a_solver_it_is_an_axis_as_fast_as_the_path_with_the_same_shares_of_its_limits(job):
+    """The turntable by the derivative of its angle, whose largest becomes 1 whatever unit it is in."""
+    machine, table = load_machine("mill"), Turntable()
+    path = round_corners(toolpath_from_program(job, machine), machine, BezierCorner())
+    samples = sample_path(path, machine, 1e-2)
+    problem = feedrate_problem(samples, machine.with_own([table]))
+    x, y = (samples.position[:, :2] + [20.0, 30.0]).T
+    turning = (x * samples.d1[:, 1] - y * samples.d1[:, 0]) / (x**2 + y**2)
+    assert np.abs(turning).max() < 0.1
+    assert np.abs(problem.d1[:, -1]).max() == pytest.approx(1.0)
+    for most, bound in (("acceleration", 40.0), ("jerk", 2000.0)):
+        share = problem.d1[:, -1] / getattr(problem, most)[-1]
+        np.testing.assert_allclose(share, turning / bound, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("method", ["second-order", "optimal"])

@@ -65,10 +65,10 @@ FORMS = ("", "P1", "S500", "X20 Y7 Z1", "P1 Q1")
 
 
 def rs274(word: str) -> str:
-    """The word between moves, arcs and a cycle."""
+    """The word between moves, arcs and a cycle, whose lengths have points: of a Fanuc program it is said where some have none."""
     return (
-        f"G21 G90 G17 G94 G99 G64 P0.05 F600 S1000 T1\nM3\nG0 X1 Y2 Z3\n{word}\nG0 X4 Y4\nG1 X10 Y5 Z1 F300\nX20.5 Y8\n"
-        "G91.1 G2 X24.5 Y12 I4 J0\nG81 X3 Y3 Z-2 R5\nG80\nG1 X0\nM2\n"
+        f"G21 G90 G17 G94 G99 G64 P0.05 F600 S1000 T1\nM3\nG0 X1. Y2. Z3.\n{word}\nG0 X4. Y4.\nG1 X10. Y5. Z1. F300\nX20.5 Y8.\n"
+        "G91.1 G2 X24.5 Y12. I4. J0.\nG81 X3. Y3. Z-2. R1.\nG80\nG1 X0.\nM2\n"
     )
 
 
@@ -166,7 +166,7 @@ def test_m_codes() -> None:
 
     def fed(word: str) -> str:
         """Without rapids: those of printers run at F, which a code of theirs has said first."""
-        return rs274(word).replace("G0 ", "G1 ").replace("G81 X3 Y3 Z-2 R5\nG80\n", "")
+        return rs274(word).replace("G0 ", "G1 ").replace("G81 X3. Y3. Z-2. R1.\nG80\n", "")
 
     assert doing_nothing(words, MORE, fed, Reading()) == nothing
 

@@ -74,7 +74,7 @@ def page(rows: list[Row]) -> str:
         "mutants",
         "killed by a test",
         "killed: no end",
-        "killed in another room",
+        "killed in another room, or since",
         "survived: the same",
         "survived",
     ]
@@ -86,9 +86,8 @@ def page(rows: list[Row]) -> str:
     ]
     return (
         markdown(columns, counts(rows))
-        + "\nKilled by the quick tests of the room alone: what only others find counts as survived until a reason names the test.\n\n"
-        + "\n".join(["| survived | why |", "|---|---|", *lines])
-        + "\n"
+        + "\nKilled by the quick tests of the room alone: what only others find counts as survived until a reason names the test, which may have\n"
+        "been written for it.\n\n" + "\n".join(["| survived | why |", "|---|---|", *lines]) + "\n"
     )
 
 

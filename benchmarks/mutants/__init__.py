@@ -86,8 +86,10 @@ def page(rows: list[Row]) -> str:
     ]
     return (
         markdown(columns, counts(rows))
-        + "\nKilled by the quick tests of the room alone: what only others find counts as survived until a reason names the test, which may have\n"
-        "been written for it.\n\n" + "\n".join(["| survived | why |", "|---|---|", *lines]) + "\n"
+        + "\nKilled by the quick tests of the room alone: what only others find counts as survived until a reason names the test,\n"
+        "which may have been written for it.\n\n"
+        + "\n".join(["| survived | why |", "|---|---|", *lines])
+        + "\n"
     )
 
 

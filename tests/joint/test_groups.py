@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from kernel_pieces import Alone, look
 from starts import MACHINE, PROGRAMS, begun, begun_on
 
 from planner.base.lanes import WIDTH as LANES
@@ -303,3 +304,12 @@ def test_lanes_find_what_single_numbers_find():
         if end.done:  # those that are not wander
             assert end[:2] == alone[0][:2]
             np.testing.assert_allclose(window.u, alone[1].u, atol=1e-6 * np.abs(window.u).max())
+
+
+@pytest.mark.parametrize("name", ["corner", "arcs"])
+def test_products_of_slacks_and_multipliers_are_what_is_asked_for_at_least(name):
+    """Rows with less hold steps up once their slack is small: windows went on to the last iteration."""
+    run, guess = begun(name)
+    alone = Alone.of(window_of(run, guess, 0, len(guess), own.MISSED, which=np.arange(0)))
+    look(alone, 0.25)
+    np.testing.assert_array_equal(alone.work.s * alone.work.z, 0.25 * (alone.group.on > 0.0))

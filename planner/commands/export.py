@@ -165,7 +165,7 @@ def _faults_of(plan: Path, run: object) -> Sequence[str]:
 
 def _say_verdict(faults: Sequence[str]) -> None:
     if faults:
-        say(f"verdict FAILED, and these files hold that motion: {'; '.join(faults[:1])}")
+        say(f"verdict FAILED, and these files hold that motion: {faults[0]}")
 
 
 @contextmanager

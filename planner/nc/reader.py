@@ -145,11 +145,9 @@ def execute(
     data, left = reading.kept(data, source)
     for line, what in left:
         findings.assume(f"{what} left out, as --ignore says", line)
+    text, line, seen = "begins with / and is left out, as with block delete on", 1, 0
     for deleted in _DELETED.finditer(data) if reading.block_delete else ():
-        text, line = (
-            "begins with / and is left out, as with block delete on",
-            data.count(b"\n", 0, deleted.start()) + 1,
-        )
+        line, seen = line + data.count(b"\n", seen, deleted.start()), deleted.start()
         if reading.strict:
             raise InputError(f"{text} (assumed without --strict)", source=source, line=line, column=1)
         findings.assume(text, line)

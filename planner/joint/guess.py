@@ -17,11 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray, freeze
+from planner.base.sizes import SIZES
 from planner.joint.leg_shapes import LegShapes, together
 from planner.joint.run import TubeRun
 from planner.motion.trajectory import Trajectory
@@ -41,6 +43,7 @@ JUMP, SEEN = 3.0, 0.1
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
 STATE = ("position", "velocity", "acceleration")
+PART = SIZES.placed_at_once  # steps
 
 
 class Cut(NamedTuple):
@@ -133,17 +136,29 @@ def guesses_from(
         state[first[k] : last[k] + 1 : count[k], :, run.axis] = rest
     passed = np.concatenate([run.passed for run in runs])
     travelled = np.interp(nodes, seen.t, seen.s)
-    moving = state * moves[np.repeat(which, count + 1), None]
-    place = _places(together(runs, axes), passed, leg, h, moving, travelled, node)
+    shapes, place = together(runs, axes), np.empty((len(leg), 4))
+    begins = np.flatnonzero(np.diff(leg, prepend=-1))
+    part = np.searchsorted(begins, np.arange(0, len(leg), PART))
+    edges = begins[np.unique(np.minimum(part, len(begins) - 1))]
+    for lo, hi in pairwise([*edges.tolist(), len(leg)]):
+        steps = slice(lo, hi)
+        of_run = moves[np.repeat(which, count)[steps]]
+        place[steps] = _places(shapes, passed, leg[steps], h[steps], state, of_run, travelled, node[steps])
     place += np.concatenate([run.offset[:-1] for run in runs])[leg, None]
     h_of, place_of = (np.split(column, np.cumsum(count)[:-1]) for column in (h, place))
     if exact is not None:
         inner = np.ones(len(nodes), dtype=bool)
         inner[first] = inner[last] = False
-        begins = [times[0] + np.cumsum(own[:-1]) for times, own in zip(vertex_times, h_of, strict=True)]
-        exactly = exact(np.concatenate(begins))
-        for m, name in enumerate(STATE):
-            state[inner, m] = getattr(exactly, name)
+        at, times = (
+            np.flatnonzero(inner),
+            np.concatenate(
+                [times[0] + np.cumsum(own[:-1]) for times, own in zip(vertex_times, h_of, strict=True)]
+            ),
+        )
+        for lo in range(0, len(at), PART):
+            exactly = exact(times[lo : lo + PART])
+            for m, name in enumerate(STATE):
+                state[at[lo : lo + PART], m] = getattr(exactly, name)
     return [
         Guess(
             leg=cuts[k][0],
@@ -229,31 +244,34 @@ def _places(
     leg: Array,
     h: FloatArray,
     state: FloatArray,
+    moves: FloatArray,
     travelled: FloatArray,
     node: Array,
 ) -> FloatArray:
-    """(N, 4) places of the control points on their legs.
+    """(N, 4) places of the control points on their legs, all steps of each.
 
     passed    : (R,) of the legs
     state     : (n, 3, A) at all nodes
+    moves     : (N, A) 1 for axes that move in the step's run, else 0
     travelled : (n,) length that the motion has travelled there [mm]
     node      : (N,) where each step begins; it ends at the next one
     """
-    (p, v), (q, w) = ((state[at, 0], state[at, 1]) for at in (node, node + 1))
+    (p, v), (q, w) = ((state[at, 0] * moves, state[at, 1] * moves) for at in (node, node + 1))
     third = h[:, None] / 3
     controls = np.concatenate([p, p + third * v, q - third * w, q])
     last = np.append(np.flatnonzero(np.diff(leg)), len(leg) - 1)  # step of every leg
     begin = np.append(0, last[:-1] + 1)
     before, behind = travelled[node], travelled[node + 1]
-    per_length = legs.length / (behind[last] - before[begin])
-    number, many = np.arange(len(leg)) - begin[leg], last - begin + 1
+    own = leg - leg[0]  # of these steps
+    per_length = legs.length[leg[0] : leg[-1] + 1] / (behind[last] - before[begin])
+    number, many = np.arange(len(leg)) - begin[own], last - begin + 1
     fraction = np.array([[0.0], [1 / 3], [2 / 3], [1.0]])
     there = (1 - fraction) * before + fraction * behind
-    x, of = ((there - before[begin][leg]) * per_length[leg]).ravel(), np.tile(leg, 4)
+    x, of = ((there - before[begin][own]) * per_length[own]).ravel(), np.tile(leg, 4)
     for _ in range(NEAREST_STEPS):
         miss, along = controls - legs.points(of, x), legs.tangents(of, x)
         x = np.clip(x + (miss * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, legs.length[of])
-    even = legs.length[leg] * (number + fraction) / many[leg]
+    even = legs.length[leg] * (number + fraction) / many[own]
     places = np.ascontiguousarray(np.where(passed[leg], even, x.reshape(4, -1)).T)
-    places[begin, 0], places[last, 3] = 0.0, legs.length
+    places[begin, 0], places[last, 3] = 0.0, legs.length[leg[begin]]
     return places

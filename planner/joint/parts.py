@@ -224,10 +224,10 @@ class FoundRun:
         return [(lo, hi, bool(kept[lo])) for lo, hi in pairwise(edges.tolist())]
 
 
-def parts_of(toolpath: Toolpath, found: FoundRun, start: SplicedRun) -> list[SplicedRun]:
+def parts_of(toolpath: Toolpath, found: FoundRun, start: SplicedRun | None) -> list[SplicedRun]:
     """The parts of the motion along a run, with the dwell before it, and the one at the end of the job.
 
-    start : the motion of the start along the run
+    start : the motion of the start along the run; None where nothing of it stays
     """
     assert found.steps is not None
     assert found.times is not None
@@ -236,6 +236,7 @@ def parts_of(toolpath: Toolpath, found: FoundRun, start: SplicedRun) -> list[Spl
     for lo, hi, stays in found.ranges():
         goes_on = hi < steps or bool(found.run.ends[1].any())
         if stays:
+            assert start is not None
             begin = start.begin if lo == 0 else float(found.times[lo])
             end = start.end if hi == steps else float(found.times[hi])
             parts.append(SplicedRun(motion=start.motion, begin=begin, end=end, moving=goes_on))

@@ -54,11 +54,14 @@ class Pieces(NamedTuple):
 
     @classmethod
     def of(cls, motions: Sequence[AxisMotion | None]) -> Pieces:
-        """Those of several motions; None stands for one without pieces."""
-        given = [one.pieces for one in motions if one is not None]
+        """Those of several motions, which hold parts of these from then on; None stands for one without pieces."""
+        given = [one for one in motions if one is not None]
         columns = {
             name: read_only(np.concatenate([getattr(one, name) for one in given])) for name in OF_PIECES
         }
+        ends = np.cumsum([len(one) for one in given]).tolist()
+        for one, end in zip(given, ends, strict=True):
+            one.hold({name: column[end - len(one) : end] for name, column in columns.items()})
         first = np.append(0, np.cumsum([0 if one is None else len(one) for one in motions]))
         return cls(**columns, first=first, end=np.array([0.0 if one is None else one.end for one in motions]))
 
@@ -136,6 +139,11 @@ class AxisMotion:
         """Those of this motion alone."""
         columns = {name: getattr(self, name) for name in OF_PIECES}
         return Pieces(**columns, first=np.array([0, len(self)]), end=np.array([float(self.end)]))
+
+    def hold(self, columns: dict[str, Any]) -> None:
+        """Hold these in place of `OF_PIECES`, of which they are a copy: part of what is kept anyway."""
+        vars(self).update(columns)
+        vars(self).pop("pieces", None)
 
     def waiting(self, at: FloatArray, by: FloatArray) -> AxisMotion:
         """The motion standing longer by `by` (n,) [s] at the piece ends nearest to `at` (n,), its rests."""

@@ -72,9 +72,10 @@ def _joint(job: Job, settings: Settings, tried: Tried) -> Tried:
         return Tried(steps=steps, left=False, laid=first.laid)
     laid = first.laid if led is job else None
     kept = cache(partial(kept_on_path, settings=settings, laid=laid))
-    found = joint_plan(job, settings, first, settings.effort.search, _others(ALONE, settings, kept))
+    planned, began = [dataclasses.replace(first, laid=None)], first.solution.cycle_time
+    del first  # the search lets go of it
+    found = joint_plan(job, settings, planned, settings.effort.search, _others(ALONE, settings, kept))
     joint = found.plan is not None
-    began = first.solution.cycle_time
     tried = Tried(
         best=found.plan, kept=kept, joint=joint, steps=found.steps, slower=found.slower, began=began
     )
@@ -107,7 +108,7 @@ def _once_more(job: Job, settings: Settings, tried: Tried) -> Tried:
     if path is None:
         return dataclasses.replace(tried, kept=None)
     others = _others(ON_PATH, settings, kept)
-    found = joint_plan(job, settings, path[0], settings.effort.search, others, path[1])
+    found = joint_plan(job, settings, [path[0]], settings.effort.search, others, path[1])
     slower = min(filter(None, (tried.slower, found.slower)), key=counted_time, default=None)
     joint = found.plan is not None
     return dataclasses.replace(tried, best=found.plan, path=path, kept=None, joint=joint, slower=slower)

@@ -38,7 +38,7 @@ from planner.planning.job.plan import NO_TABLES, Delivered, Plan, Tables
 from planner.planning.job.runs_alone import ALONE_MOST, Alone, with_runs_alone
 from planner.planning.joint_start import Start, between_leads, with_leads
 from planner.planning.optimal.effort import Search, Settings
-from planner.planning.optimal.notes import path_notes
+from planner.planning.optimal.notes import noted, path_notes
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.path_motion import priced
 from planner.sensitivity.activity import history
@@ -99,13 +99,14 @@ def searchable(job: Job, *, jerk_limited: bool) -> bool:
 def joint_plan(
     job: Job,
     settings: Settings,
-    planned: OnPath,
+    planned: list[OnPath],
     search: Search,
     others: Others,
     motion: Motion | None = None,
 ) -> Joint:
     """The plan of the joint search from a motion on a path.
 
+    planned: that motion alone: it is taken out, as nothing of it but its notes is kept while runs are searched, unless it stays
     search : how finely, and up to which size
     others : what there is where the search does not end, or the verdict finds something
     motion : that on the path with its limits kept: it stays where the search does not end; else None
@@ -113,16 +114,24 @@ def joint_plan(
     stays, led = motion is not None, with_leads(job)
     with job.stage("search") as report:
         runs = list(tube_runs_of(job.toolpath, job.machine, jerk_limited=settings.order.jerk_limited))
-        start = Start(motion or between_leads(planned.motion(), job, led), job, runs, search.cut)
-        steps = sum(map(len, start.guesses))
+        path = planned.pop()
+        start = Start(motion or between_leads(path.motion(), job, led), job, runs, search.cut)
+        at_joints, solver = noted(led.toolpath, path), path.solution.solver
+        kept_path = (path, motion) if motion else None
+        del path
+        steps = sum(map(len, start.guesses.values()))
         if steps > search.steps_max:
             job.tell("search", steps=steps, of=search.steps_max)
             return Joint(None, steps)
-        found = searched_runs(runs, start, search.of(steps), report, stays=stays)
+        search = search.of(steps)
+        if not search.finer:
+            start.forget(stays=stays)
+        found = searched_runs(runs, start, search, report, stays=stays)
+        start.forget(stays=stays)
     made, looked = None, found
     while looked and (made is None or made.delivered.slower):
         if any(one.whole or (stays and one.steps) for one in looked):
-            parts = [_parts(job, one, start.spliced(k), stays=stays) for k, one in enumerate(looked)]
+            parts = [_parts(job, one, start.spliced(k) if stays else None) for k, one in enumerate(looked)]
             other = with_runs_alone(
                 job,
                 parts,
@@ -141,10 +150,9 @@ def joint_plan(
     slower = made.delivered.slower if made else None
     time = made.delivered.trajectory.cycle_time if made and not slower else np.nan
     count, kept = len(made.plans) if made else 0, made is not None and slower is None
-    job.tell("search", found=time, before=start.motion.end, kept=kept, steps=steps, alone=count)
+    job.tell("search", found=time, before=start.end, kept=kept, steps=steps, alone=count)
     if made is None:
         return Joint(None, steps)
-    start.forget()
     delivered = slower or made.delivered
     for k in (*made.plans, *made.stays):
         why = found[k].sentence if not found[k].whole else "what was found there does not pass its verdict"
@@ -153,19 +161,19 @@ def joint_plan(
     if len(left) == len(found) and not made.plans:  # the motion is the start's, which others deliver
         return Joint(None, steps)
     status, sentence = said(job, start, found, left, "", "a path first, then its feed")
-    stayed = others.kept(job) if made.stays else (planned, motion) if motion else None
+    stayed = others.kept(job) if made.stays else kept_path
     held = history(stayed[0].problem, stayed[0].solution, *times_of_pieces(stayed[1])) if stayed else None
     alone_held = {k: plan.grid for k, plan in made.plans.items()}
     tables, notes = tabled(job, held, delivered, found, left, alone_held)
-    if tables.prices is None and stays and priced(planned, job.machine):
-        tables = dataclasses.replace(tables, priced=planned)
+    if tables.prices is None and kept_path and priced(kept_path[0], job.machine):
+        tables = dataclasses.replace(tables, priced=kept_path[0])
         notes = (OF_THE_START,)
-    of_path = path_notes(led.toolpath, planned, _stays(led, found, made.plans))
+    of_path = path_notes(led.toolpath, at_joints, _stays(led, found, made.plans))
     plan = job.plan(
         delivered._replace(filtered=filters_count(*job.real)),
         method=settings.method,
         corner=settings.corner_name,
-        solver=planned.solution.solver,
+        solver=solver,
         status=status,
         sentence=sentence,
         grid_points=sum(len(one.steps.h) + 1 for one in found if one.steps is not None),
@@ -185,11 +193,11 @@ def _time(made: Alone) -> float:
     return (made.delivered.slower or made.delivered).trajectory.cycle_time
 
 
-def _parts(job: Job, found: FoundRun, start: SplicedRun, *, stays: bool) -> list[SplicedRun] | None:
-    """The parts of the motion along a run; None where it has to be planned by itself."""
-    if found.whole or (stays and found.steps is not None):
+def _parts(job: Job, found: FoundRun, start: SplicedRun | None) -> list[SplicedRun] | None:
+    """The parts of the motion along a run; None where it has to be planned by itself; start: as of `parts_of`."""
+    if found.whole or (start and found.steps is not None):
         return parts_of(job.toolpath, found, start)
-    return [start] if stays else None
+    return [start] if start else None
 
 
 def _stays(job: Job, found: list[FoundRun], alone: Container[int]) -> Array:
@@ -230,7 +238,7 @@ def searched_runs(
     runs: list[TubeRun], start: Start, search: Search, report: Report, *, stays: bool
 ) -> list[FoundRun]:
     """The solution on each run."""
-    size = np.array([len(guess) for guess in start.guesses])
+    size = np.array([len(start.guesses[k]) for k in range(len(runs))])
     order, done = np.argsort(-size, kind="stable").tolist(), np.zeros(len(runs))  # shares
 
     def one(k: int) -> Searching[FoundRun]:
@@ -253,7 +261,7 @@ def search_run(
     if isinstance(solver, InTwo):
         taken = yield from _in_two(k, run, start, solver)
     else:
-        guess = start.guesses[k]
+        guess = start.guesses.pop(k)
         taken = [(guess, (yield from search_with(solver, run, guess)))]
     found = FoundRun(run, Status.ACCEPTABLE, taken[-1][1].sentence)
     for guess, solution in taken:
@@ -272,7 +280,7 @@ def search_run(
 
 def _in_two(k: int, run: TubeRun, start: Start, solver: InTwo) -> Searching[list[tuple[Guess, TubeSolution]]]:
     """The steps from which each search began whose motion was taken, and its solution, the last one in the shortest steps."""
-    guess = start.guesses[k]
+    guess = start.guesses.pop(k)
     found = yield from solver.first.search(run, guess)
     if found.steps is None or (found.kept is not None and found.kept.any()):
         if not solver.finer:
@@ -328,7 +336,7 @@ def said(
     took = _without(found, stays)
     worst = next((one for one in took if one.status is Status.ACCEPTABLE), took[0] if took else None)
     text = worst.sentence if worst else "no motion faster than the start's was found"
-    text += f"; before that ({what}) {first.motion.end:.6g} s"
+    text += f"; before that ({what}) {first.end:.6g} s"
     if stays:
         run, line = found[stays[0]].run, job.toolpath.line
         why = why or found[stays[0]].sentence

@@ -32,7 +32,8 @@ TOGETHER = 1000  # legs of short runs that are cut together: what is known of th
 class Start(RunsInTime):
     """A motion from which the search begins, and where in it the runs are.
 
-    guesses : the motion along each run, cut into steps as finely as `cut` says
+    guesses : the motion along each run, by its number, cut into steps as finely as `cut` says: who searches a run takes it
+    end     : of the motion [s]
     """
 
     def __init__(self, motion: MotionInTime, job: Job, runs: Sequence[TubeRun], cut: Cut = DEFAULT_CUT):
@@ -40,12 +41,14 @@ class Start(RunsInTime):
         size = np.cumsum([len(run) for run in runs])
         edges = np.searchsorted(size, np.arange(0, size[-1], TOGETHER), side="right")
         parts = pairwise([*np.unique(edges).tolist(), len(runs)])
-        self.guesses = [guess for lo, hi in parts for guess in self.cut(lo, runs[lo:hi], cut)]
+        of_runs = (guess for lo, hi in parts for guess in self.cut(lo, runs[lo:hi], cut))
+        self.guesses, self.end = dict(enumerate(of_runs)), motion.end
 
-    def forget(self) -> None:
-        """Let go of what only a search needs: half a kilobyte a step."""
-        self.guesses.clear()
-        vars(self).pop("seen", None)
+    def forget(self, *, stays: bool) -> None:
+        """Let go of what only `cut` needs, of the motion too unless parts of it may stay: a quarter of a gigabyte for 250,000
+        blocks."""
+        for name in ["seen"] if stays else ["seen", "motion"]:
+            vars(self).pop(name, None)
 
     def cut(self, first: int, runs: Sequence[TubeRun], cut: Cut) -> list[Guess]:
         """The motion along the runs from the first one on, cut into steps; exact at the nodes, so that parts of it can

@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
+from planner.base.sizes import SIZES
 from planner.feedrate.constraints.limits import ACCELERATION, CHORD_ERROR, FEED, JERK, VELOCITY
 from planner.geometry.toolpath import Toolpath
 from planner.joint import price
@@ -24,6 +25,7 @@ from planner.sensitivity.records import GridHistory
 
 TOLERANCE = "tolerance"
 STANDS = 1e-9  # shorter standstills are rounding of times [s]
+PART = SIZES.looked_at_once  # steps
 SEEN = 1e-3  # period of a trajectory that is looked at at given times only [s]
 PRICE_OF = (price.FEED, price.NORMAL, price.ROOM)  # of the shares behind those of the axes
 
@@ -87,11 +89,16 @@ def found_history(
     t = np.minimum(np.maximum.accumulate(np.concatenate(rows.t)), motion.end)
     t = slowed.run_at(t)
     single, which = np.unique(np.minimum(t, slowed.end), return_inverse=True)
-    seen, reached = slowed.at(single, SEEN), np.concatenate(rows.reached)
+    s, feed = np.empty(len(single)), np.empty(len(single))
+    for lo in range(0, len(single), PART):
+        these = slice(lo, lo + PART)
+        seen = slowed.at(single[these], SEEN)
+        s[these], feed[these] = seen.s, seen.feed
+    reached = np.concatenate(rows.reached)
     return GridHistory(
         t=t,
-        s=seen.s[which],
-        feed=seen.feed[which],
+        s=s[which],
+        feed=feed[which],
         active=np.concatenate(rows.active),
         reached=reached,
         active_names=names,
@@ -115,31 +122,43 @@ def _of_steps(
 ) -> None:
     """Rows of the steps lo .. hi - 1 of a run, with the standstills around them."""
     (lo, hi), (part, begin) = which, at
-    steps, place, run = found.steps, found.place, found.run
+    steps, run = found.steps, found.run
     assert steps is not None
-    assert place is not None
     before = toolpath.dwell[run.first[0]] if lo == 0 else 0.0
     rows.stand(begin, before)
+    many, named = len(toolpath.axes), run.laws.named
+    of_laws = [rows.names.index(run.laws.laws[m].name) for m in named]
+    column = np.concatenate(
+        [*(quantity * many + run.axis for quantity in range(3)), 3 * many + np.arange(len(PRICE_OF)), of_laws]
+    ).astype(np.int64)
+    active, reached = np.empty(hi - lo, np.int64), np.zeros((hi - lo, len(rows.names)), dtype=bool)
+    for first in range(lo, hi, PART):
+        beyond = min(first + PART, hi)
+        at_limit, shown = _active(found, max(first - 1, lo), beyond)
+        own, to = slice(min(first - lo, 1), None), slice(first - lo, beyond - lo)
+        reached[to, column] = at_limit[own]
+        active[to] = column[shown[own]]
+    reached[:, -2] = ~reached.any(axis=1)
+    active = np.where(reached[:, -2], len(rows.names) - 2, active)
+    t = begin + before + np.append(0.0, np.cumsum(steps.h[lo:hi]))
+    rows.add(t[:-1], active, reached)
+    rows.stand(t[-1], part.end - part.begin - (t[-1] - begin))
+
+
+def _active(found: FoundRun, lo: int, hi: int) -> tuple[Array, Array]:
+    """(hi - lo, 3 A + 3 + M) which limits of a run the steps lo .. hi - 1 come near to (joint/shares.py), and which of them
+    (hi - lo,) has the largest price."""
+    steps, place, run, moving = found.steps, found.place, found.run, len(found.run.axis)
+    assert steps is not None
+    assert place is not None
     names = ("h", "position", "velocity", "acceleration", "jerk")
     own = Steps(**{name: getattr(steps, name)[lo:hi] for name in names})
     leg = run.leg_at((place[lo:hi] + place[lo + 1 : hi + 1]) / 2.0)
     used = shares(run, own, leg, place[lo : hi + 1]) >= 1.0 - HELD
-    moving, many = len(run.axis), len(toolpath.axes)
-    column = np.concatenate([quantity * many + run.axis for quantity in range(3)])
-    named = run.laws.named
-    of_laws = [rows.names.index(run.laws.laws[m].name) for m in named]
-    column = np.concatenate([column, 3 * many + np.arange(len(PRICE_OF)), of_laws]).astype(np.int64)
-    reached = np.zeros((hi - lo, len(rows.names)), dtype=bool)
-    reached[:, column] = used
-    reached[:, -2] = ~used.any(axis=1)
     paid = np.zeros(used.shape)
     if found.price is not None:
-        behind = (*PRICE_OF, *(price.LAWS + m for m in named))
+        behind = (*PRICE_OF, *(price.LAWS + m for m in run.laws.named))
         of = [*range(3 * moving), *(3 * moving + column for column in behind)]
         paid = -found.price[lo:hi, of]
         paid[:, 3 * moving + PRICE_OF.index(price.ROOM)] -= found.price[lo:hi, 3 * moving + price.VERTEX]
-    active = column[np.argmax(np.where(used, 1.0 + paid / own.h[:, None], 0.0), axis=1)]
-    active = np.where(reached[:, -2], len(rows.names) - 2, active)
-    t = begin + before + np.append(0.0, np.cumsum(own.h))
-    rows.add(t[:-1], active, reached)
-    rows.stand(t[-1], part.end - part.begin - (t[-1] - begin))
+    return used, np.argmax(np.where(used, 1.0 + paid / own.h[:, None], 0.0), axis=1)

@@ -37,7 +37,8 @@ class RunPrices:
     """dT/d(ln limit) of a run with N steps on R legs [s].
 
     leg, segment, middle : (N,) of the steps, and the place of their middles along the run [mm]
-    step, alone          : (N, 3 A + 5 + M) of joint/price.py, without feed and velocities held together
+    step                 : (N, 3 A + 5 + M) of joint/price.py
+    tied                 : (N,) where feed and velocities hold together, so that more of one alone is worth nothing
     vertex               : (R+1,) of what vertices may use
     """
 
@@ -47,9 +48,7 @@ class RunPrices:
         assert found.steps is not None
         least = TIED * found.steps.h
         held = -step[:, 2 * axes : 3 * axes + 1] > least[:, None]  # by the velocities, and by the feed
-        tied = held[:, -1] & held[:, :-1].any(axis=1)
-        self.alone = step.copy()
-        self.alone[tied, 2 * axes : 3 * axes + 1] = 0.0
+        self.tied = held[:, -1] & held[:, :-1].any(axis=1)
         self.middle = (place[:-1] + place[1:]) / 2.0
         self.leg = found.run.leg_at(self.middle)
         first, last = found.run.first[0], found.run.first[-1]
@@ -63,12 +62,13 @@ class RunPrices:
 
     def of_feed(self) -> FloatArray:
         """(N,) prices of the feed where more of it alone is worth something."""
-        return np.asarray(self.alone[:, 3 * len(self.found.run.axis) + price.FEED])
+        return np.where(self.tied, 0.0, self.of(price.FEED))
 
     def of_axes(self, many: int) -> FloatArray:
         """(3, many) dT/d(ln limit) of the quantities of all axes, where more of them alone is worth something [s]."""
         found, axes = np.zeros((len(QUANTITIES), many)), self.found.run.axis
-        columns = np.ascontiguousarray(self.alone[:, : len(QUANTITIES) * len(axes)].T)
+        columns = np.ascontiguousarray(self.step[:, : len(QUANTITIES) * len(axes)].T)
+        columns[2 * len(axes) :, self.tied] = 0.0
         found[:, axes] = columns.sum(axis=1).reshape(len(QUANTITIES), -1)
         return found
 

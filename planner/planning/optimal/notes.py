@@ -1,5 +1,7 @@
 """The notes of a motion on a smooth path, in short sentences, each with its first line and a count."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from planner.base.arrays import Array, FloatArray
@@ -9,35 +11,54 @@ from planner.planning.optimal.on_path import OnPath
 from planner.smoothing.spline_path import SplineShape
 
 
-def path_notes(toolpath: Toolpath, best: OnPath, stays: Array | None = None) -> list[str]:
-    """The notes of a motion on a smooth path: splines, corners that are not rounded, full stops of the solver.
+class Noted(NamedTuple):
+    """Joints of a toolpath, each (n,), of which a motion on a smooth path has something to say.
+
+    exact : full stops because of G61
+    added : other full stops that the program has not
+    sharp : corners that are not rounded
+    lost  : where the profile rests
+    """
+
+    exact: Array
+    added: Array
+    sharp: Array
+    lost: Array
+
+
+def noted(toolpath: Toolpath, best: OnPath) -> Noted:
+    """The joints to be noted: splines, corners that are not rounded, full stops of the solver.
 
     toolpath : the program's own
     best     : the path and its solved motion
-    stays    : (M+1,) the toolpath's joints where this motion is the one that is delivered; None for all
     """
-    notes: list[str] = []
     path, at = best.path, best.path.legs.first
-    here = np.ones(len(at), bool) if stays is None else stays[at]
-    added = (path.joint == Joint.STOP) & (toolpath.resting().joint[at] != Joint.STOP) & here
+    added = (path.joint == Joint.STOP) & (toolpath.resting().joint[at] != Joint.STOP)
     exact = added & np.isin(at, exact_stops(toolpath))
-    notes += exact_note(toolpath, at[exact])
-    added &= ~exact
-    if added.any():
-        notes.append(
-            _at(toolpath, at[added], "full stop", "where no smooth curve was found inside the tolerance")
-        )
     on_spline = np.zeros(len(path.joint), bool)
     for first, last in zip(path.spline.joint_first, path.spline.joint_last, strict=True):
         on_spline[first : last + 1] = True
-    sharp = (path.joint == Joint.CORNER) & (path.d == 0.0) & ~on_spline & here
-    if sharp.any():
-        notes.append(_at(toolpath, at[sharp], "corner", "not rounded: there is no room for it"))
-    lost = _standstills(best)
-    lost = lost[stays[lost]] if stays is not None else lost
-    if len(lost):
-        notes.append(_at(toolpath, lost, "full stop", "where the solver did not converge"))
-    return notes
+    sharp = (path.joint == Joint.CORNER) & (path.d == 0.0) & ~on_spline
+    return Noted(at[exact], at[added & ~exact], at[sharp], _standstills(best))
+
+
+def path_notes(toolpath: Toolpath, at: Noted, stays: Array | None = None) -> list[str]:
+    """The notes of a motion on a smooth path.
+
+    toolpath : the program's own
+    at       : what of it is noted
+    stays    : (M+1,) the toolpath's joints where this motion is the one that is delivered; None for all
+    """
+    exact, *others = at if stays is None else (joints[stays[joints]] for joints in at)
+    why = (
+        ("full stop", "where no smooth curve was found inside the tolerance"),
+        ("corner", "not rounded: there is no room for it"),
+        ("full stop", "where the solver did not converge"),
+    )
+    of_others = (
+        _at(toolpath, joints, *each) for joints, each in zip(others, why, strict=True) if len(joints)
+    )
+    return [*exact_note(toolpath, exact), *of_others]
 
 
 def exact_note(toolpath: Toolpath, at: Array) -> tuple[str, ...]:

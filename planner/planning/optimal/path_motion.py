@@ -30,7 +30,7 @@ from planner.planning.optimal.behind_filters import within_filters
 from planner.planning.optimal.compare_corners import corner_bounds, with_corners
 from planner.planning.optimal.effort import BEGINNING, COARSE, Grids, Settings
 from planner.planning.optimal.geometry import Laid, corner_shape, splined_with_stops, tell_splines
-from planner.planning.optimal.notes import no_spline_note, not_compared_note, path_notes
+from planner.planning.optimal.notes import no_spline_note, not_compared_note, noted, path_notes
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.tighten import within_limits
 from planner.sensitivity.activity import history
@@ -168,7 +168,7 @@ def plan_of_solution(
             delivered = delivered.motion  # what the solution is of
         with job.stage("report"):
             grid = history(best.problem, best.solution, *times_of_pieces(delivered))
-        notes = (*path_notes(job.toolpath, best), *best.notes)
+        notes = (*path_notes(job.toolpath, noted(job.toolpath, best)), *best.notes)
     return job.plan(
         made,
         method=settings.method,

@@ -17,7 +17,7 @@ from planner.machine import Machine, load_machine
 from planner.nc.reader import parse_program
 from planner.planning.job.notes import TOLERANCE_OF_PART, job_notes
 from planner.planning.methods.stop import StopMethod
-from planner.planning.optimal.notes import path_notes
+from planner.planning.optimal.notes import noted, path_notes
 from planner.planning.optimal.on_path import OnPath
 from planner.planning.optimal.order import second_order
 
@@ -66,24 +66,30 @@ def test_what_a_path_gives_up_is_noted() -> None:
         return second_order(path, sample_path(path, machine), machine, Reachability())
 
     whole = solved([])
-    assert path_notes(toolpath, whole) == []
-    assert path_notes(toolpath, solved([2])) == [
+    assert path_notes(toolpath, noted(toolpath, whole)) == []
+    assert path_notes(toolpath, noted(toolpath, solved([2]))) == [
         "line 3: a full stop where no smooth curve was found inside the tolerance"
     ]
-    assert path_notes(toolpath, solved([2, 4]))[0].startswith("line 3: the first of 2 full stops")
+    assert path_notes(toolpath, noted(toolpath, solved([2, 4])))[0].startswith(
+        "line 3: the first of 2 full stops"
+    )
 
     stays = np.arange(len(toolpath) + 1) != 2  # elsewhere another motion is delivered
-    assert path_notes(toolpath, solved([2]), stays) == []
-    assert path_notes(toolpath, solved([2, 4]), stays)[0].startswith("line 5: a full stop")
+    assert path_notes(toolpath, noted(toolpath, solved([2])), stays) == []
+    assert path_notes(toolpath, noted(toolpath, solved([2, 4])), stays)[0].startswith("line 5: a full stop")
 
     still = np.flatnonzero(whole.samples.segment == 3)[1]
     feed_sq = whole.solution.feed_sq.copy()
     feed_sq[still] = 0.0
     stuck = dataclasses.replace(whole, solution=dataclasses.replace(whole.solution, feed_sq=feed_sq))
-    assert path_notes(toolpath, stuck, np.arange(len(toolpath) + 1) < 4) == []
-    assert path_notes(toolpath, stuck) == ["line 5: a full stop where the solver did not converge"]
+    assert path_notes(toolpath, noted(toolpath, stuck), np.arange(len(toolpath) + 1) < 4) == []
+    assert path_notes(toolpath, noted(toolpath, stuck)) == [
+        "line 5: a full stop where the solver did not converge"
+    ]
 
     d = whole.path.d.copy()
     d[1] = 0.0
     sharp = dataclasses.replace(whole, path=dataclasses.replace(whole.path, d=d))
-    assert path_notes(toolpath, sharp) == ["line 2: a corner not rounded: there is no room for it"]
+    assert path_notes(toolpath, noted(toolpath, sharp)) == [
+        "line 2: a corner not rounded: there is no room for it"
+    ]

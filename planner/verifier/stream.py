@@ -4,6 +4,7 @@ The limits need to know the block of the path under each sample, so the matching
 first. Three samples are carried over from block to block, for the third differences.
 """
 
+import dataclasses
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -33,6 +34,7 @@ from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst, state_of
 
 BLOCK_SAMPLES = SIZES.judged_at_once
+Found = tuple[SampleBlock, FloatArray, Located]  # with the positions (n, A) [mm]
 
 
 @dataclass(eq=False, kw_only=True)
@@ -101,17 +103,18 @@ class Watch:
         )
         self._feeds = Feeds(pieces, bounds, self.seen.worst, GROUPS * axes + FEED, limits.axes)
 
-    def take(self, chunk: Trajectory) -> None:
-        """Read the next samples."""
+    def locate(self, chunk: Trajectory) -> Iterator[Found]:
+        """Find the next samples on the path, block by block, each of which is then to be judged, here or in another thread."""
         begin = int(np.searchsorted(chunk.t, self.seen.t_last, side="right"))
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
             t, state = state_of(chunk, slice(low, low + BLOCK_SAMPLES), self._carried)
-            self._take_block(t, state, skip=len(self._carried[0]))
+            skip = len(self._carried[0])
             # copies: views would keep the whole block
             self._carried = t[-BACK:].copy(), state[-BACK:].copy()
+            yield self._locate_block(t, state, skip)
 
-    def _take_block(self, t: FloatArray, state: FloatArray, skip: int) -> None:
-        """Take in one block, the carried samples first; state as in `SampleBlock`."""
+    def _locate_block(self, t: FloatArray, state: FloatArray, skip: int) -> tuple[SampleBlock, Located]:
+        """Find one block, the carried samples first; state as in `SampleBlock`."""
         pieces, limits, seen = self._pieces, self._limits, self.seen
         position = np.ascontiguousarray(state[:, 0])
         seen.take(t, position, skip)
@@ -120,7 +123,15 @@ class Watch:
         match_samples(pieces, seen.match, t, position, skip, self._parts, cubic, self._at_stop, place)
         both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
         seen.apart = np.maximum(seen.apart, both)
-        block = SampleBlock(t=t, state=state, piece=place.piece, skip=skip, travelled=self._travelled)
+        return SampleBlock(t=t, state=state, piece=place.piece, skip=skip), position, place
+
+    def judge(self, blocks: Iterable[Found]) -> None:
+        """Hold the next blocks against the limits."""
+        for block, position, place in blocks:
+            self._judge_block(dataclasses.replace(block, travelled=self._travelled), position, place)
+
+    def _judge_block(self, block: SampleBlock, position: FloatArray, place: Located) -> None:
+        limits, seen, t = self._limits, self.seen, block.t
         speed, none = np.full(len(t), np.nan), np.zeros_like(t)
         if limits.judged[0]:
             v = np.asfortranarray(block.velocity)
@@ -129,9 +140,10 @@ class Watch:
             self._travelled = look_at_axes(block, limits, seen.worst)
             known, cut = position[:, None], np.full(len(t), np.nan)
         else:
-            known, cut = state, self._take_between(block, self._edges, place)
+            known, cut = block.state, self._take_between(block, self._edges, place)
         piece, _, first, last = place
-        self._feeds.take(Chords(t, none, none.copy(), speed, piece, first, last, cut, known), skip)
+        chords = Chords(t, none, none.copy(), speed, piece, first, last, cut, known)
+        self._feeds.take(chords, block.skip, position)
         for look in (look_at_tangential, look_at_power, look_at_user_limits):
             look(block, limits, seen.worst)
 

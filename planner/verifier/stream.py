@@ -5,6 +5,7 @@ first. Three samples are carried over from block to block, for the third differe
 """
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -134,8 +135,7 @@ class Watch:
         limits, seen, t = self._limits, self.seen, block.t
         speed, none = np.full(len(t), np.nan), np.zeros_like(t)
         if limits.judged[0]:
-            v = np.asfortranarray(block.velocity)
-            speed = np.sqrt(np.einsum("na,na->n", v, v))
+            _speeds(block.state, speed)
         if self._edges is None:
             self._travelled = look_at_axes(block, limits, seen.worst)
             known, cut = position[:, None], np.full(len(t), np.nan)
@@ -217,6 +217,16 @@ def follow(
             each(t[skip:], ratio[skip:], Located(*(column[skip:] for column in place)))
         carried_t, carried = t[-1:], position[-1:]
     return seen
+
+
+@kernel()
+def _speeds(state, speed):
+    """|v| of each state, as in `SampleBlock`, into `speed` (n,)."""
+    for k in range(len(speed)):
+        square = 0.0
+        for i in range(state.shape[2]):
+            square += state[k, 1, i] * state[k, 1, i]
+        speed[k] = math.sqrt(square)
 
 
 @kernel()

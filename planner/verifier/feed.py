@@ -60,6 +60,8 @@ class Feeds:
         self._judge(np.inf)
 
     def _judge(self, until: float) -> None:
+        if not self._left:
+            return
         worst, sample = self._worst.row[self._row].copy(), np.full(1, -1, dtype=np.int64)
         found, spans = self._switches.found, list[tuple[FloatArray, FloatArray]]()
         known = int(found.state[OPEN])
@@ -79,7 +81,7 @@ class Feeds:
             if done < len(chords.t):
                 self._left.insert(0, Chords(*(column[done - 1 :] for column in chords)))
                 break
-        t, over = (np.concatenate(columns) for columns in zip(*spans))
+        t, over = (np.concatenate(columns) for columns in zip(*spans, strict=True))
         if over.any():
             self._worst.over.add(NAMES.index("feed"), t, over)
         self._gap = max((float(np.diff(chords.t).max()) for chords in self._left), default=0.0)

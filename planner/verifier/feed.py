@@ -60,7 +60,7 @@ class Feeds:
         self._judge(np.inf)
 
     def _judge(self, until: float) -> None:
-        if not self._left:
+        if not self._left or (self._left[0].place[1:2] > until).any():
             return
         worst, sample = self._worst.row[self._row].copy(), np.full(1, -1, dtype=np.int64)
         found, spans = self._switches.found, list[tuple[FloatArray, FloatArray]]()
@@ -69,7 +69,16 @@ class Feeds:
             chords = self._left.pop(0)
             over = np.zeros(len(chords.t))
             done = _judged(
-                self._pieces, self._groups, found.switch, known, self._block, chords, until, worst, sample, over
+                self._pieces,
+                self._groups,
+                found.switch,
+                known,
+                self._block,
+                chords,
+                until,
+                worst,
+                sample,
+                over,
             )
             spans.append((chords.t[1:], over[1:]))
             k = int(sample[0])
@@ -81,8 +90,8 @@ class Feeds:
             if done < len(chords.t):
                 self._left.insert(0, Chords(*(column[done - 1 :] for column in chords)))
                 break
-        t, over = (np.concatenate(columns) for columns in zip(*spans, strict=True))
-        if over.any():
+        if any(over.any() for _, over in spans):
+            t, over = (np.concatenate(columns) for columns in zip(*spans, strict=True))
             self._worst.over.add(NAMES.index("feed"), t, over)
         self._gap = max((float(np.diff(chords.t).max()) for chords in self._left), default=0.0)
 

@@ -87,44 +87,44 @@ class Reader:
             if self.comparison is not None:
                 self.comparison.deliver(chunk)
             for block in seen.locate(chunk):
-                yield seen.judge([block])
+                seen.judge([block])
+                yield
 
     def _between(
         self, pieces: ProgramPieces, seen: Watch, samples: Iterator[None], progress: Callable[[float], None]
     ) -> Watch:
-        """Read the motion, and the samples as far as it goes, side by side: its next part is evaluated, the
-        one before is found on the path, that before it is held against the limits, which takes longest, and the samples
-        beside it are read. What is seen does not depend on the threads."""
+        """Read the motion, and the samples as far as it goes, side by side: a part is held against the limits, which
+        takes longest, while the next one is found on the path, the samples beside that are read, and the one after
+        it is evaluated. What is seen does not depend on the threads."""
         assert self.motion is not None
         assert self.comparison is not None
         edges = np.asarray(self.motion.t)
         between = Watch(pieces, self.limits, parts=1, edges=edges, note="between the samples")
         self.comparison.begin()
         parts = motion_between(self.motion, *self._times)
-        part, blocks = list(itertools.islice(parts, 1)), list[Found]()
-        while part or blocks:
-            coming, found = list[Trajectory](), list[Found]()
-            tasks: list[Callable[[], None]] = [functools.partial(between.judge, blocks)]
-            for one in part:
-                locate, beside = between.locate(one), functools.partial(self._beside, seen, samples, one)
-                tasks += [functools.partial(found.extend, locate), beside]
-                tasks += [functools.partial(coming.extend, itertools.islice(parts, 1))]
+        part, found = next(parts, None), list[Found]()
+        while part is not None or found:
+            coming, more = list[Trajectory](), list[Found]()
+            tasks: list[Callable[[], None]] = [functools.partial(between.judge, found)]
+            if part is not None:
+                tasks.append(functools.partial(more.extend, between.locate(part)))
+                tasks.append(functools.partial(self._beside, seen, samples, part))
+                tasks.append(functools.partial(coming.extend, itertools.islice(parts, 1)))
             if len(self.trajectory) > SIDE_BY_SIDE and threads() > 1:
                 side_by_side(tasks, lambda: None, lambda: None)
             else:
                 for task in tasks:
                     task()
-            for one in part:
-                progress(min(1.0, float(one.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
-            part, blocks = coming, found
+            if part is not None:
+                progress(min(1.0, float(part.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
+            part, found = next(iter(coming), None), more
         return between
 
     def _beside(self, seen: Watch, samples: Iterator[None], part: Trajectory) -> None:
         """Read the samples as far as a part of the motion goes, and compare both."""
         assert self.comparison is not None
-        while seen.seen.t_last < part.t[-1]:
-            if next(samples, self) is self:
-                break
+        while seen.seen.t_last < part.t[-1] and next(samples, self) is not self:
+            pass
         self.comparison.compare(part)
 
 

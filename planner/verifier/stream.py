@@ -1,7 +1,8 @@
 """A motion read in blocks of samples: limits and matching side by side, with little memory.
 
 The limits need to know the block of the path under each sample, so the matching of a block of samples goes
-first. Three samples are carried over from block to block, for the third differences.
+first, which does not depend on them: a block can be judged while the next ones are matched. Three samples are
+carried over from block to block, for the third differences.
 """
 
 import dataclasses
@@ -35,7 +36,7 @@ from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst, state_of
 
 BLOCK_SAMPLES = SIZES.judged_at_once
-Found = tuple[SampleBlock, FloatArray, Located]  # with the positions (n, A) [mm]
+Found = tuple[SampleBlock, FloatArray, Located]  # samples, their positions (n, A) [mm] and where they lie
 
 
 @dataclass(eq=False, kw_only=True)
@@ -105,19 +106,19 @@ class Watch:
         self._feeds = Feeds(pieces, bounds, self.seen.worst, GROUPS * axes + FEED, limits.axes)
 
     def locate(self, chunk: Trajectory) -> Iterator[Found]:
-        """Find the next samples on the path, block by block, each of which is then to be judged, here or in another thread."""
+        """Find the next samples on the path, block by block; each is then to be judged, here or in another thread."""
         begin = int(np.searchsorted(chunk.t, self.seen.t_last, side="right"))
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
-            t, state = state_of(chunk, slice(low, low + BLOCK_SAMPLES), self._carried)
-            skip = len(self._carried[0])
-            # copies: views would keep the whole block
-            self._carried = t[-BACK:].copy(), state[-BACK:].copy()
-            yield self._locate_block(t, state, skip)
+            yield self._locate_block(chunk, slice(low, low + BLOCK_SAMPLES))
 
-    def _locate_block(self, t: FloatArray, state: FloatArray, skip: int) -> tuple[SampleBlock, Located]:
-        """Find one block, the carried samples first; state as in `SampleBlock`."""
+    def _locate_block(self, chunk: Trajectory, part: slice) -> Found:
+        """Find a part of a chunk, behind the carried samples."""
         pieces, limits, seen = self._pieces, self._limits, self.seen
-        position = np.ascontiguousarray(state[:, 0])
+        before, skip = self._carried, len(self._carried[0])
+        t, state = state_of(chunk, part, before)
+        position = np.concatenate([before[1][:, 0], chunk.position[part]])
+        # copies: views would keep the whole block
+        self._carried = t[-BACK:].copy(), state[-BACK:].copy()
         seen.take(t, position, skip)
         place = nowhere(len(t))
         cubic = np.ascontiguousarray(state[:, 1]) if self._cubic else position[:0]
@@ -132,6 +133,7 @@ class Watch:
             self._judge_block(dataclasses.replace(block, travelled=self._travelled), position, place)
 
     def _judge_block(self, block: SampleBlock, position: FloatArray, place: Located) -> None:
+        """Hold one block against the limits."""
         limits, seen, t = self._limits, self.seen, block.t
         speed, none = np.full(len(t), np.nan), np.zeros_like(t)
         if limits.judged[0]:

@@ -183,4 +183,9 @@ def _put_together(x, v, a, j, state):
     """Columns (n, A) into `state` (n, 4, A): rows of a few numbers take numpy four times as long."""
     for k in range(len(x)):
         for i in range(x.shape[1]):
-            state[k, 0, i], state[k, 1, i], state[k, 2, i], state[k, 3, i] = x[k, i], v[k, i], a[k, i], j[k, i]
+            state[k, 0, i], state[k, 1, i], state[k, 2, i], state[k, 3, i] = (
+                x[k, i],
+                v[k, i],
+                a[k, i],
+                j[k, i],
+            )

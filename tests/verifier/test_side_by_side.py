@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from judging import M, SQUARE, judge, square
+from judging import SQUARE, M, judge, square
 from motions import Asked, polyline, sample
 
 from planner.base.threads import use_threads

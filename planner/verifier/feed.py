@@ -69,17 +69,8 @@ class Feeds:
             chords = self._left.pop(0)
             over = np.zeros(len(chords.t))
             done = _judged(
-                self._pieces,
-                self._groups,
-                found.switch,
-                known,
-                self._block,
-                chords,
-                until,
-                worst,
-                sample,
-                over,
-            )
+                self._pieces, self._groups, found.switch, known, self._block, chords, until, worst, sample, over
+            )  # fmt: skip
             spans.append((chords.t[1:], over[1:]))
             k = int(sample[0])
             if k >= 0:

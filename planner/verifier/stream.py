@@ -107,47 +107,40 @@ class Watch:
 
     def locate(self, chunk: Trajectory) -> Iterator[Found]:
         """Find the next samples on the path, block by block; each is then to be judged, here or in another thread."""
-        begin = int(np.searchsorted(chunk.t, self.seen.t_last, side="right"))
-        for low in range(begin, len(chunk), BLOCK_SAMPLES):
-            yield self._locate_block(chunk, slice(low, low + BLOCK_SAMPLES))
-
-    def _locate_block(self, chunk: Trajectory, part: slice) -> Found:
-        """Find a part of a chunk, behind the carried samples."""
         pieces, limits, seen = self._pieces, self._limits, self.seen
-        before, skip = self._carried, len(self._carried[0])
-        t, state = state_of(chunk, part, before)
-        position = np.concatenate([before[1][:, 0], chunk.position[part]])
-        # copies: views would keep the whole block
-        self._carried = t[-BACK:].copy(), state[-BACK:].copy()
-        seen.take(t, position, skip)
-        place = nowhere(len(t))
-        cubic = np.ascontiguousarray(state[:, 1]) if self._cubic else position[:0]
-        match_samples(pieces, seen.match, t, position, skip, self._parts, cubic, self._at_stop, place)
-        both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
-        seen.apart = np.maximum(seen.apart, both)
-        return SampleBlock(t=t, state=state, piece=place.piece, skip=skip), position, place
+        begin = int(np.searchsorted(chunk.t, seen.t_last, side="right"))
+        for low in range(begin, len(chunk), BLOCK_SAMPLES):
+            part, before, skip = slice(low, low + BLOCK_SAMPLES), self._carried, len(self._carried[0])
+            t, state = state_of(chunk, part, before)
+            position = np.concatenate([before[1][:, 0], chunk.position[part]])
+            # copies: views would keep the whole block
+            self._carried = t[-BACK:].copy(), state[-BACK:].copy()
+            seen.take(t, position, skip)
+            place = nowhere(len(t))
+            cubic = np.ascontiguousarray(state[:, 1]) if self._cubic else position[:0]
+            match_samples(pieces, seen.match, t, position, skip, self._parts, cubic, self._at_stop, place)
+            both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
+            seen.apart = np.maximum(seen.apart, both)
+            yield SampleBlock(t=t, state=state, piece=place.piece, skip=skip), position, place
 
     def judge(self, blocks: Iterable[Found]) -> None:
         """Hold the next blocks against the limits."""
-        for block, position, place in blocks:
-            self._judge_block(dataclasses.replace(block, travelled=self._travelled), position, place)
-
-    def _judge_block(self, block: SampleBlock, position: FloatArray, place: Located) -> None:
-        """Hold one block against the limits."""
-        limits, seen, t = self._limits, self.seen, block.t
-        speed, none = np.full(len(t), np.nan), np.zeros_like(t)
-        if limits.judged[0]:
-            _speeds(block.state, speed)
-        if self._edges is None:
-            self._travelled = look_at_axes(block, limits, seen.worst)
-            known, cut = position[:, None], np.full(len(t), np.nan)
-        else:
-            known, cut = block.state, self._take_between(block, self._edges, place)
-        piece, _, first, last = place
-        chords = Chords(t, none, none.copy(), speed, piece, first, last, cut, known)
-        self._feeds.take(chords, block.skip, position)
-        for look in (look_at_tangential, look_at_power, look_at_user_limits):
-            look(block, limits, seen.worst)
+        limits, worst = self._limits, self.seen.worst
+        for found, position, place in blocks:
+            block, t = dataclasses.replace(found, travelled=self._travelled), found.t
+            speed, none = np.full(len(t), np.nan), np.zeros_like(t)
+            if limits.judged[0]:
+                _speeds(block.state, speed)
+            if self._edges is None:
+                self._travelled = look_at_axes(block, limits, worst)
+                known, cut = position[:, None], np.full(len(t), np.nan)
+            else:
+                known, cut = block.state, self._take_between(block, self._edges, place)
+            piece, _, first, last = place
+            chords = Chords(t, none, none.copy(), speed, piece, first, last, cut, known)
+            self._feeds.take(chords, block.skip, position)
+            for look in (look_at_tangential, look_at_power, look_at_user_limits):
+                look(block, limits, worst)
 
     def _take_between(self, block: SampleBlock, edges: FloatArray, place: Located) -> FloatArray:
         """Take in a block of a motion and what lies between its times. -> (n,) as `Between.cut`"""

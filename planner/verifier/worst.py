@@ -173,19 +173,16 @@ def state_of(
     t, state = before or (new[:0], np.empty((0, 1 + len(DERIVATIVES), axes)))
     whole = np.empty((len(t) + len(new), *state.shape[1:]))
     whole[: len(t)] = state
-    x, v, a, j = (getattr(chunk, name)[part] for name in ("position", *DERIVATIVES))
-    _put_together(x, v, a, j, whole[len(t) :])
+    columns = tuple(getattr(chunk, name)[part] for name in ("position", *DERIVATIVES))
+    _put_together(columns, whole[len(t) :])
     return np.concatenate([t, new]), whole
 
 
 @kernel()
-def _put_together(x, v, a, j, state):
-    """Columns (n, A) into `state` (n, 4, A): rows of a few numbers take numpy four times as long."""
-    for k in range(len(x)):
-        for i in range(x.shape[1]):
-            state[k, 0, i], state[k, 1, i], state[k, 2, i], state[k, 3, i] = (
-                x[k, i],
-                v[k, i],
-                a[k, i],
-                j[k, i],
-            )
+def _put_together(columns, state):
+    """Four columns (n, A) into `state` (n, 4, A): rows of a few numbers take numpy four times as long."""
+    for order in range(len(columns)):
+        column = columns[order]
+        for k in range(len(column)):
+            for i in range(column.shape[1]):
+                state[k, order, i] = column[k, i]

@@ -181,8 +181,8 @@ def state_of(
 @kernel()
 def _put_together(columns, state):
     """Four columns (n, A) into `state` (n, 4, A): rows of a few numbers take numpy four times as long."""
-    for order in range(len(columns)):
-        column = columns[order]
-        for k in range(len(column)):
-            for i in range(column.shape[1]):
-                state[k, order, i] = column[k, i]
+    x, v, a, j = columns
+    for k in range(len(x)):
+        for i in range(x.shape[1]):
+            state[k, 0, i], state[k, 1, i] = x[k, i], v[k, i]
+            state[k, 2, i], state[k, 3, i] = a[k, i], j[k, i]

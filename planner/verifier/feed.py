@@ -17,6 +17,7 @@ Where a block begins and ends to within `reach` (nearest.py), both are meant, an
 
 import numpy as np
 
+from planner.base.arrays import FloatArray
 from planner.verifier.excess import NAMES
 from planner.verifier.kernel import kernel
 from planner.verifier.passing import JUDGED, OPEN, SURE, Bounds, Chords
@@ -34,16 +35,20 @@ class Feeds:
         self._pieces, self._bounds, self._switches = pieces, bounds, Switches(pieces, bounds)
         self._worst, self._row = worst, row
         self._block = np.zeros(1, dtype=np.int64)  # the first one that chords can still be on
-        self._left = list[Chords]()  # blocks: put together when they are judged
-        self._gap = 0.0  # between them at most [s]
+        self._left = list[Chords]()  # blocks, each with the last sample of the one before as its first
+        self._gap = 0.0  # between their samples at most [s]
+        self._end = np.zeros(2)  # place and error of the last sample
 
-    def take(self, new: Chords, skip: int) -> None:
-        """The next samples, as `Switches.take`."""
+    def take(self, new: Chords, skip: int, position: FloatArray) -> None:
+        """The next samples, as `Switches.take`; position (n, A) [mm]."""
         self._switches.take(new, skip)
-        new = Chords(*(column[skip:].copy() for column in new._replace(state=new.state[:, :1])))
-        before = self._left[-1].t[-1:] if self._left else new.t[:1]
-        self._left += [new] if len(new.t) else []
-        gap = self._gap = float(np.diff(new.t, prepend=before).max(initial=self._gap))
+        begin = max(skip - 1, 0)
+        if skip:
+            new.place[begin], new.error[begin] = self._end
+        self._end = np.array([new.place[-1], new.error[-1]])
+        new = Chords(*(column[begin:] for column in new._replace(state=position[:, None])))
+        self._left.append(new)
+        gap = self._gap = float(np.diff(new.t).max(initial=self._gap))
         pace = float(np.linalg.norm(self._bounds.velocity))
         push = self._bounds.acceleration * gap
         room = 2.0 * gap * (pace + (push if np.isfinite(push) else pace))  # the longest reach of a vertex
@@ -55,32 +60,31 @@ class Feeds:
         self._judge(np.inf)
 
     def _judge(self, until: float) -> None:
-        if not self._left or self._first_end() > until:
-            return
-        chords = Chords(*(np.concatenate(blocks) for blocks in zip(*self._left, strict=True)))
-        if len(chords.t) < 2:
+        if not self._left or (self._left[0].place[1:2] > until).any():
             return
         worst, sample = self._worst.row[self._row].copy(), np.full(1, -1, dtype=np.int64)
-        over = np.zeros(len(chords.t))
-        known = int(self._switches.found.state[OPEN])
-        switch = self._switches.found.switch
-        done = _judged(
-            self._pieces, self._groups, switch, known, self._block, chords, until, worst, sample, over
-        )
-        if over.any():
-            self._worst.over.add(NAMES.index("feed"), chords.t, over)
-        k = int(sample[0])
-        if k >= 0:
-            seen = tuple(worst.tolist())
-            self._worst.keep(self._row, seen, float(chords.t[k]), chords.state[k, 0], int(chords.piece[k]))
-        self._switches.found.along[JUDGED] = float(chords.place[done - 1])
-        self._left = [Chords(*(column[done - 1 :].copy() for column in chords))]
-        self._gap = float(np.diff(self._left[0].t).max(initial=0.0))
-
-    def _first_end(self) -> float:
-        """The place at which the first chord ends; inf without one."""
-        places = [place for chords in self._left[:2] for place in chords.place[:2].tolist()]
-        return places[1] if len(places) > 1 else float("inf")
+        found, spans = self._switches.found, list[tuple[FloatArray, FloatArray]]()
+        known = int(found.state[OPEN])
+        while self._left:
+            chords = self._left.pop(0)
+            over = np.zeros(len(chords.t))
+            done = _judged(
+                self._pieces, self._groups, found.switch, known, self._block, chords, until, worst, sample, over
+            )  # fmt: skip
+            spans.append((chords.t[1:], over[1:]))
+            k = int(sample[0])
+            if k >= 0:
+                seen, at = tuple(worst.tolist()), chords.state[k, 0]
+                self._worst.keep(self._row, seen, float(chords.t[k]), at, int(chords.piece[k]))
+                sample[0] = -1
+            found.along[JUDGED] = float(chords.place[done - 1])
+            if done < len(chords.t):
+                self._left.insert(0, Chords(*(column[done - 1 :] for column in chords)))
+                break
+        if any(over.any() for _, over in spans):
+            t, over = (np.concatenate(columns) for columns in zip(*spans, strict=True))
+            self._worst.over.add(NAMES.index("feed"), t, over)
+        self._gap = max((float(np.diff(chords.t).max()) for chords in self._left), default=0.0)
 
 
 @kernel()

@@ -96,7 +96,10 @@ def rounding_of(new, k, begin, bounds):
         error = (
             ROUNDING_ULPS * 2.0**-52 * (abs(new.state[k, 0, axis]) + begin + bounds.velocity[axis] * new.t[k])
         )
-        error += bounds.digits[axis] + (bounds.digits[axes] * (move / h + push) if k else 0.0)
+        digits = bounds.digits[axis]
+        if k and bounds.digits[axes] > 0.0:  # most times have all digits, and a division takes long
+            digits += bounds.digits[axes] * (move / h + push)
+        error += digits
         error_sq += error * error
     return math.sqrt(error_sq)
 

@@ -30,7 +30,7 @@ from planner.verifier.given import Given
 from planner.verifier.limits import ACCELERATION
 from planner.verifier.pieces import PERIOD_ROUNDING, PLACE_ROUNDING, RATIO_ROUNDING, ProgramPieces
 from planner.verifier.samples import Delivered
-from planner.verifier.stream import Observed, Watch
+from planner.verifier.stream import Found, Observed, Watch
 from planner.verifier.worst import Limits
 
 SIDE_BY_SIDE = SIZES.read_shared
@@ -72,58 +72,60 @@ class Reader:
         dt, (parts, cubic) = self.trajectory.dt, self._way
         self.delivered = Delivered(dt, self.given, max(dt, self._times[0]) if self.motion is None else None)
         seen = Watch(pieces, self.limits, parts=parts, cubic=cubic)
-        samples = self.trajectory.chunks()
+        samples = self._samples(seen)
         between = None if self.motion is None else self._between(pieces, seen, samples, progress)
-        for chunk in samples:
-            self._take(seen, chunk)
+        for _ in samples:
             progress(seen.seen.samples / len(self.trajectory))
         for watch in [seen] if between is None else [seen, between]:
             watch.finish()
         return [seen.seen] if between is None or not between.seen.samples else [seen.seen, between.seen]
 
+    def _samples(self, seen: Watch) -> Iterator[None]:
+        """Read the samples, block by block."""
+        for chunk in self.trajectory.chunks():
+            self.delivered.take(chunk)
+            if self.comparison is not None:
+                self.comparison.deliver(chunk)
+            for block in seen.locate(chunk):
+                seen.judge([block])
+                yield
+
     def _between(
-        self,
-        pieces: ProgramPieces,
-        seen: Watch,
-        samples: Iterator[Trajectory],
-        progress: Callable[[float], None],
+        self, pieces: ProgramPieces, seen: Watch, samples: Iterator[None], progress: Callable[[float], None]
     ) -> Watch:
-        """Read the motion, and the samples as far as it goes, side by side: its next part is evaluated, the
-        one before is read, and the samples beside it. What is seen does not depend on the threads."""
+        """Read the motion, and the samples as far as it goes, side by side: a part is held against the limits, which
+        takes longest, while the next one is found on the path, the samples beside that are read, and the one after
+        it is evaluated. What is seen does not depend on the threads."""
         assert self.motion is not None
         assert self.comparison is not None
         edges = np.asarray(self.motion.t)
         between = Watch(pieces, self.limits, parts=1, edges=edges, note="between the samples")
         self.comparison.begin()
         parts = motion_between(self.motion, *self._times)
-        part = next(parts, None)
-        while part is not None:
-            found: list[Trajectory] = []
-            tasks: list[Callable[[], None]] = [
-                functools.partial(found.extend, itertools.islice(parts, 1)),
-                functools.partial(between.take, part),
-                functools.partial(self._catch_up, seen, samples, part),
-            ]
+        part, found = next(parts, None), list[Found]()
+        while part is not None or found:
+            coming, more = list[Trajectory](), list[Found]()
+            tasks: list[Callable[[], None]] = [functools.partial(between.judge, found)]
+            if part is not None:
+                tasks.append(functools.partial(more.extend, between.locate(part)))
+                tasks.append(functools.partial(self._beside, seen, samples, part))
+                tasks.append(functools.partial(coming.extend, itertools.islice(parts, 1)))
             if len(self.trajectory) > SIDE_BY_SIDE and threads() > 1:
                 side_by_side(tasks, lambda: None, lambda: None)
             else:
                 for task in tasks:
                     task()
-            self.comparison.compare(part)
-            progress(min(1.0, float(part.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
-            part = next(iter(found), None)
+            if part is not None:
+                progress(min(1.0, float(part.t[-1]) / max(self.motion.end, PERIOD_ROUNDING)))
+            part, found = next(iter(coming), None), more
         return between
 
-    def _catch_up(self, seen: Watch, samples: Iterator[Trajectory], part: Trajectory) -> None:
-        """Read the samples as far as a part of the motion goes."""
-        while seen.seen.t_last < part.t[-1] and (chunk := next(samples, None)) is not None:
-            self._take(seen, chunk)
-
-    def _take(self, seen: Watch, chunk: Trajectory) -> None:
-        seen.take(chunk)
-        self.delivered.take(chunk)
-        if self.comparison is not None:
-            self.comparison.deliver(chunk)
+    def _beside(self, seen: Watch, samples: Iterator[None], part: Trajectory) -> None:
+        """Read the samples as far as a part of the motion goes, and compare both."""
+        assert self.comparison is not None
+        while seen.seen.t_last < part.t[-1] and next(samples, self) is not self:
+            pass
+        self.comparison.compare(part)
 
 
 class Comparison:
@@ -149,8 +151,9 @@ class Comparison:
         """The next delivered samples."""
         self.first = float(chunk.t[0]) if np.isnan(self.first) else self.first
         self.last = float(chunk.t[-1])
-        self._sample_t = np.concatenate([self._sample_t, chunk.t])
-        self._sample = np.concatenate([self._sample, chunk.position])
+        waits = len(self._sample_t) > 0
+        self._sample_t = np.concatenate([self._sample_t, chunk.t]) if waits else chunk.t
+        self._sample = np.concatenate([self._sample, chunk.position]) if waits else chunk.position
 
     def compare(self, chunk: Trajectory) -> None:
         """The next part of the motion; the samples until its end are delivered."""
@@ -168,7 +171,7 @@ class Comparison:
                 if off[k] > self.excess[axis]:
                     self.excess[axis], self.time[axis] = off[k], t[at][k]
         left = slice(int(np.searchsorted(t, seen_t[-1])), None)
-        self._sample_t, self._sample = t[left].copy(), self._sample[left].copy()
+        self._sample_t, self._sample = t[left], self._sample[left]
 
     def faults(self, limits: Limits, readings: list[Observed]) -> list[Fault]:
         """The differences."""

@@ -1,9 +1,12 @@
 """A motion read in blocks of samples: limits and matching side by side, with little memory.
 
 The limits need to know the block of the path under each sample, so the matching of a block of samples goes
-first. Three samples are carried over from block to block, for the third differences.
+first, which does not depend on them: a block can be judged while the next ones are matched. Three samples are
+carried over from block to block, for the third differences.
 """
 
+import dataclasses
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -33,6 +36,7 @@ from planner.verifier.pieces import ProgramPieces, both_apart, reach_piece
 from planner.verifier.worst import BACK, COLUMN, Limits, SampleBlock, Worst, state_of
 
 BLOCK_SAMPLES = SIZES.judged_at_once
+Found = tuple[SampleBlock, FloatArray, Located]  # samples, their positions (n, A) [mm] and where they lie
 
 
 @dataclass(eq=False, kw_only=True)
@@ -101,39 +105,42 @@ class Watch:
         )
         self._feeds = Feeds(pieces, bounds, self.seen.worst, GROUPS * axes + FEED, limits.axes)
 
-    def take(self, chunk: Trajectory) -> None:
-        """Read the next samples."""
-        begin = int(np.searchsorted(chunk.t, self.seen.t_last, side="right"))
+    def locate(self, chunk: Trajectory) -> Iterator[Found]:
+        """Find the next samples on the path, block by block; each is then to be judged, here or in another thread."""
+        pieces, limits, seen = self._pieces, self._limits, self.seen
+        begin = int(np.searchsorted(chunk.t, seen.t_last, side="right"))
         for low in range(begin, len(chunk), BLOCK_SAMPLES):
-            t, state = state_of(chunk, slice(low, low + BLOCK_SAMPLES), self._carried)
-            self._take_block(t, state, skip=len(self._carried[0]))
+            part, before, skip = slice(low, low + BLOCK_SAMPLES), self._carried, len(self._carried[0])
+            t, state = state_of(chunk, part, before)
+            position = np.concatenate([before[1][:, 0], chunk.position[part]])
             # copies: views would keep the whole block
             self._carried = t[-BACK:].copy(), state[-BACK:].copy()
+            seen.take(t, position, skip)
+            place = nowhere(len(t))
+            cubic = np.ascontiguousarray(state[:, 1]) if self._cubic else position[:0]
+            match_samples(pieces, seen.match, t, position, skip, self._parts, cubic, self._at_stop, place)
+            both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
+            seen.apart = np.maximum(seen.apart, both)
+            yield SampleBlock(t=t, state=state, piece=place.piece, skip=skip), position, place
 
-    def _take_block(self, t: FloatArray, state: FloatArray, skip: int) -> None:
-        """Take in one block, the carried samples first; state as in `SampleBlock`."""
-        pieces, limits, seen = self._pieces, self._limits, self.seen
-        position = np.ascontiguousarray(state[:, 0])
-        seen.take(t, position, skip)
-        place = nowhere(len(t))
-        cubic = np.ascontiguousarray(state[:, 1]) if self._cubic else position[:0]
-        match_samples(pieces, seen.match, t, position, skip, self._parts, cubic, self._at_stop, place)
-        both = both_apart(pieces, place.piece[skip:], position[skip:], limits.axes)
-        seen.apart = np.maximum(seen.apart, both)
-        block = SampleBlock(t=t, state=state, piece=place.piece, skip=skip, travelled=self._travelled)
-        speed, none = np.full(len(t), np.nan), np.zeros_like(t)
-        if limits.judged[0]:
-            v = np.asfortranarray(block.velocity)
-            speed = np.sqrt(np.einsum("na,na->n", v, v))
-        if self._edges is None:
-            self._travelled = look_at_axes(block, limits, seen.worst)
-            known, cut = position[:, None], np.full(len(t), np.nan)
-        else:
-            known, cut = state, self._take_between(block, self._edges, place)
-        piece, _, first, last = place
-        self._feeds.take(Chords(t, none, none.copy(), speed, piece, first, last, cut, known), skip)
-        for look in (look_at_tangential, look_at_power, look_at_user_limits):
-            look(block, limits, seen.worst)
+    def judge(self, blocks: Iterable[Found]) -> None:
+        """Hold the next blocks against the limits."""
+        limits, worst = self._limits, self.seen.worst
+        for found, position, place in blocks:
+            block, t = dataclasses.replace(found, travelled=self._travelled), found.t
+            speed, none = np.full(len(t), np.nan), np.zeros_like(t)
+            if limits.judged[0]:
+                _speeds(block.state, speed)
+            if self._edges is None:
+                self._travelled = look_at_axes(block, limits, worst)
+                known, cut = position[:, None], np.full(len(t), np.nan)
+            else:
+                known, cut = block.state, self._take_between(block, self._edges, place)
+            piece, _, first, last = place
+            chords = Chords(t, none, none.copy(), speed, piece, first, last, cut, known)
+            self._feeds.take(chords, block.skip, position)
+            for look in (look_at_tangential, look_at_power, look_at_user_limits):
+                look(block, limits, worst)
 
     def _take_between(self, block: SampleBlock, edges: FloatArray, place: Located) -> FloatArray:
         """Take in a block of a motion and what lies between its times. -> (n,) as `Between.cut`"""
@@ -205,6 +212,16 @@ def follow(
             each(t[skip:], ratio[skip:], Located(*(column[skip:] for column in place)))
         carried_t, carried = t[-1:], position[-1:]
     return seen
+
+
+@kernel()
+def _speeds(state, speed):
+    """|v| of each state, as in `SampleBlock`, into `speed` (n,)."""
+    for k in range(len(speed)):
+        square = 0.0
+        for i in range(state.shape[2]):
+            square += state[k, 1, i] * state[k, 1, i]
+        speed[k] = math.sqrt(square)
 
 
 @kernel()

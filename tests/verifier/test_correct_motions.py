@@ -191,7 +191,7 @@ point = st.tuples(coordinate, coordinate, coordinate)
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(points=st.lists(point, min_size=2, max_size=12), jerk=st.sampled_from([np.inf, 2e5, 5e3]))
 @example(points=[(0.0, 46.281, -49.516), (0.0, 0.75, 46.277)], jerk=2e5)  # ends 0.06 us after a look
 def test_every_polyline_run_rest_to_rest_passes(points, jerk):
@@ -208,7 +208,7 @@ def test_every_polyline_run_rest_to_rest_passes(points, jerk):
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(scale=st.floats(0.01, 100), legs=st.integers(1, 6), seed=st.integers(0, 99))
 def test_scaling_lengths_and_limits_leaves_the_ratios(scale, legs, seed):
     points = np.round(np.random.default_rng(seed).uniform(-20, 20, (legs + 1, 3)), 3)

@@ -79,7 +79,7 @@ def machine(seed: int = 0, **more) -> Machine:
     "method", slow_but(set(HOLDING) - {"optimal", "second-order", "fir-spline"}, HOLDING)
 )
 @given(seed=seeds, axes=st.integers(2, 4))
-@settings(max_examples=8)
+@settings(max_examples=6)
 def test_tolerance_and_limits_hold(method, seed, axes):
     """`optimal` in up to three axes: tests/laws/test_axes.py has searches in four and five."""
     few, most = ({"effort": "quick"}, 3) if method == "optimal" else ({}, 4)

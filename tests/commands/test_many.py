@@ -95,7 +95,7 @@ def test_several_programs(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
 def test_ctrl_c_loses_only_what_is_not_finished(tmp_path: Path) -> None:
     (tmp_path / "small.ngc").write_text(SQUARE)
-    zigzag = "\n".join(f"G1 X{k % 2} Y{k * 0.01:.2f}" for k in range(40_000))
+    zigzag = "\n".join(f"G1 X{k % 2} Y{k * 0.01:.2f}" for k in range(200_000))
     (tmp_path / "large.ngc").write_text(f"G21 F6000\n{zigzag}\n")
     out = tmp_path / "out"
     command = [

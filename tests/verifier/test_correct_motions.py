@@ -176,7 +176,7 @@ def test_segments_far_shorter_than_the_budget_pass():
 
 @pytest.mark.slow
 def test_a_spiral_with_turns_closer_than_the_budget_passes():
-    angle = np.linspace(0, 20 * np.pi, 1200)
+    angle = np.linspace(0, 12 * np.pi, 720)
     radius = 5 + 0.02 * angle / (2 * np.pi)
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle], 1)
     moves = Moves(tuple(points[0]))

@@ -37,7 +37,10 @@ ASKING = (0.05, 0.03)
 BEZIER = {"optimal": "bezier", "second-order": "bezier"}  # on splines below
 METHODS = ["stop", "kinematic", "bezier", "fir", "fir-spline", "second-order", "optimal"]
 # Filters that the motions of these two show to ask nothing: of a closed form and of a search.
-BEHIND = [*((method, ASKING) for method in METHODS), *((m, some) for m in ("kinematic", "optimal") for some in LENGTHS[:2])]
+BEHIND = [
+    *((method, ASKING) for method in METHODS),
+    *((m, some) for m in ("kinematic", "optimal") for some in LENGTHS[:2]),
+]
 
 
 def machine(lengths, **more):

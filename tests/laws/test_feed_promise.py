@@ -50,7 +50,7 @@ def test_blocks_that_are_passed_together_are_searched(seed):
 
 @pytest.mark.shows("feed", "sampled: by code of the tests, every method, F that changes at every block")
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [6, 7, 14])  # a slope, a plane, arcs
+@pytest.mark.parametrize("seed", [6, 7, 39])  # a slope, a plane, arcs
 def test_f_is_kept_by_every_method(seed):
     for method in METHODS:
         found = row(seed, method)

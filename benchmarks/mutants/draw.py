@@ -12,6 +12,7 @@ import ast
 import random
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import islice
 from pathlib import Path
 
@@ -76,14 +77,20 @@ class Mutant:
 
 def drawn(area: str, count: int, seed: int = 0) -> list[Mutant]:
     """So many of an area, in a random order that the seed fixes: the first of them are the same for any count."""
-    places = []
+    places = list(_places_of(area))
+    random.Random(f"{area} {seed}").shuffle(places)
+    return list(islice((place for place in places if not _is_strict(place)), count))
+
+
+@cache
+def _places_of(area: str) -> tuple[Mutant, ...]:
+    places = list[Mutant]()
     for file in sorted({file for pattern in AREAS[area] for file in ROOT.glob(pattern)}):
         found = list(_places(file, area))
         if "@kernel" in file.read_text(encoding="utf-8"):
             found = found[::KERNELS]
         places += found
-    random.Random(f"{area} {seed}").shuffle(places)
-    return list(islice((place for place in places if not _is_strict(place)), count))
+    return tuple(places)
 
 
 def _is_strict(place: Mutant) -> bool:

@@ -77,7 +77,7 @@ def halves(points: FloatArray, t: float) -> tuple[FloatArray, FloatArray]:
     seed=st.integers(0, 10**6),
     scale=st.floats(0.3, 3.0),
 )
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_equation_8_with_the_bar_is_the_g2_condition(sigma, seed, scale):
     """kappa1(1) = (2/3) sigma2 h/a^2, kappa2(0) = (2/3) sigma1bar h'/a'^2 (docs/papers.md C4): equal iff sigma2/sigma1bar is eq.
     (8)'s right side.

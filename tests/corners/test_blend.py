@@ -158,7 +158,7 @@ def assert_joins_with_curvature(found, legs, k: int, d_in: float, d_out: float) 
     turns=st.tuples(st.sampled_from([-1, 1]), st.sampled_from([-1, 1])), rise=st.floats(0.0, 3.0),
     sweep=st.floats(0.2, 6.0),
 )  # fmt: skip
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_random_arc_corners_are_regular_and_within_tolerance(theta, radii, turns, rise, sweep):
     program = arc_pair(np.deg2rad(theta), radii, turns, rise, sweep)
     path = smooth_path(program, MACHINE)

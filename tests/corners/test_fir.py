@@ -80,7 +80,7 @@ def test_it_is_the_superposition_of_two_filtered_pulses(T1, T2, Tk):
 
 
 @given(theta=thetas, T1=times, ratio=ratios, eps=st.floats(1e-5, 1.0))
-@settings(max_examples=100)
+@settings(max_examples=50)
 def test_equation_15_inverts_equation_14_on_every_branch(theta, T1, ratio, eps):
     T2 = T1 * ratio
     s = np.sin(theta / 2)

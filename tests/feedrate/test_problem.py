@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_problems import line
 
@@ -104,6 +104,7 @@ def test_chord_error_is_used_up(kappa: float, share: float, dt: float) -> None:
 
 
 @given(curvature, positive, st.lists(st.floats(1e-3, 0.1), min_size=1, max_size=3))
+@settings(max_examples=30)
 def test_filter_error_is_used_up(kappa: float, tol: float, lengths: list[float]) -> None:
     x = built_in.feed_sq_of_filters(one(kappa), one(tol), tuple(lengths))[0]
     assert kappa * x * sum(T * T for T in lengths) / 24.0 == pytest.approx(tol)

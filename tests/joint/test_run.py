@@ -90,7 +90,7 @@ def test_further_derivatives_of_curves_are_within_their_bounds():
 
 @pytest.mark.slow
 @given(places=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), t=st.floats(0.0, 1.0))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_a_leg_is_off_its_own_cubic_by_no_more_than_the_bound(places, t):
     """The cubic that meets the leg at both ends with its velocity, along any places that do not go back."""
     weights = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])

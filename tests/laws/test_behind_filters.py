@@ -36,6 +36,11 @@ LENGTHS = [(0.01, 0.004), (0.02, 0.013), (0.05, 0.03)]
 ASKING = (0.05, 0.03)
 BEZIER = {"optimal": "bezier", "second-order": "bezier"}  # on splines below
 METHODS = ["stop", "kinematic", "bezier", "fir", "fir-spline", "second-order", "optimal"]
+# Filters that the motions of these two show to ask nothing: of a closed form and of a search.
+BEHIND = [
+    *((method, ASKING) for method in METHODS),
+    *((m, some) for m in ("kinematic", "optimal") for some in LENGTHS[:2]),
+]
 
 
 def machine(lengths, **more):
@@ -89,8 +94,7 @@ def assert_kept(made, lengths):
 
 @pytest.mark.shows("filters", "sampled: every method within the tolerance behind them")
 @pytest.mark.slow
-@pytest.mark.parametrize("lengths", slow_but([ASKING], LENGTHS), ids=str)
-@pytest.mark.parametrize("method", slow_but(("stop", "kinematic", "fir", "second-order"), METHODS))
+@pytest.mark.parametrize(("method", "lengths"), BEHIND, ids=str)
 def test_behind_the_filters_nothing_leaves_the_tolerance(method, lengths):
     assert_kept(plan(JOB, machine(lengths), method=method, corner=BEZIER.get(method)), lengths)
 

@@ -18,7 +18,7 @@ from planner.machine import Axis, load_machine
 
 @pytest.mark.parametrize("method", METHODS[1:])
 def test_f_is_kept_along_a_line(method):
-    for seed in range(4):
+    for seed in range(2):
         found = row(seed, method, kind="line")
         assert outcome(found) == "passed, kept", found
         job = case(seed, "line")
@@ -50,7 +50,7 @@ def test_blocks_that_are_passed_together_are_searched(seed):
 
 @pytest.mark.shows("feed", "sampled: by code of the tests, every method, F that changes at every block")
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(5, 9))
+@pytest.mark.parametrize("seed", [6, 7, 39])  # a slope, a plane, arcs
 def test_f_is_kept_by_every_method(seed):
     for method in METHODS:
         found = row(seed, method)

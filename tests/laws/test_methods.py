@@ -79,7 +79,7 @@ def machine(seed: int = 0, **more) -> Machine:
     "method", slow_but(set(HOLDING) - {"optimal", "second-order", "fir-spline"}, HOLDING)
 )
 @given(seed=seeds, axes=st.integers(2, 4))
-@settings(max_examples=8)
+@settings(max_examples=6)
 def test_tolerance_and_limits_hold(method, seed, axes):
     """`optimal` in up to three axes: tests/laws/test_axes.py has searches in four and five."""
     few, most = ({"effort": "quick"}, 3) if method == "optimal" else ({}, 4)
@@ -138,7 +138,7 @@ def corner_job(theta: float, axes: int, seed: int) -> Program:
 
 @pytest.mark.slow
 @given(theta=corners, axes=st.integers(2, 3), seed=seeds, eps=st.floats(-3.0, 0.0).map(lambda x: 10**x))
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_equation_15_misses_the_vertex_by_the_tolerance(theta, axes, seed, eps):
     """`fir-plain`: exactly, or by eps_2, the most that a complete overlap can. By the interior angle it would be another error.
 
@@ -156,7 +156,7 @@ def test_equation_15_misses_the_vertex_by_the_tolerance(theta, axes, seed, eps):
 
 @pytest.mark.slow
 @given(theta=corners, axes=st.integers(2, 4), seed=seeds)
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_a_kinematic_corner_misses_the_vertex_by_the_tolerance(theta, axes, seed):
     """At most, where it is run through; exactly 0 where it is stopped at. With more tolerance alone it is missed by more, or the feed
     makes it as fast as it is."""

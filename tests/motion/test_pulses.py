@@ -73,7 +73,7 @@ def counter(train: AxisPulses, times: FloatArray) -> FloatArray:
 @pytest.mark.shows("pulses", "certified: less than one pulse off at every instant")
 @pytest.mark.slow
 @given(seed=st.integers(0, 10**6), steps=st.floats(0.5, 4), other=st.floats(0.5, 3))
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_less_than_one_pulse_off_at_every_instant(seed, steps, other):
     """Against the motion itself, with reversals inside periods, just before and after every pulse and at many other times."""
     samples, at = cubic_motion(seed)

@@ -29,7 +29,7 @@ NOT_NC = (".csv", ".plt", ".hpgl")  # plotter files: tests/nc/hpgl
 PROGRAMS = sorted(p for p in (SHARED / "nc").glob("*") if p.suffix not in NOT_NC) if SHARED.is_dir() else []
 NOWHERE = 1e-9  # [mm]
 END_OF_FILE = "File ended with no percent sign"  # LinuxCNC wants M2, M30 or %; a file that just ends has moved all the same
-HEAD = 100_000  # [bytes]
+HEAD = 40_000  # [bytes]
 # Programs that cut threads: the oracle does not say at which feed.
 THREADS = ("LinuxCNC__linuxcnc__lathe-g76.ngc",)
 

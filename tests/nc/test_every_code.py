@@ -72,6 +72,7 @@ def rs274(word: str) -> str:
     )
 
 
+SAMPLED = 13  # of the numbers that stand in no table, which one rule is for, every so many are tried
 IN_FORCE = "is in force, or the program says it again"
 G_NOTHING = {
     **dict.fromkeys(
@@ -104,7 +105,7 @@ G_TABLE = sorted(
         1130,
         1870,
     }
-    | {10 * n for n in range(200)}
+    | {10 * n for n in range(200) if n < 100 or n % SAMPLED == 0}
 )
 
 
@@ -141,9 +142,6 @@ M_OF_RS274 = {
     (70, 71): "keeps or forgets modes; M72 brings them back",
 }
 MORE = ("", "P1", "Q1", "S500", "X20 Y7 Z1", "P1 Q1", "S150 R5")
-
-
-SAMPLED = 13  # of the numbers that stand in no table, which one rule is for, every so many are tried
 
 
 def m_numbers(own: Iterable[int] = ()) -> list[int]:

@@ -24,7 +24,7 @@ from planner.base.errors import InputError
 from planner.nc.reader import parse_program
 
 KINDS = {**OF_ONE_KIND, "moves": random_program, "splines": random_splines, "together": together}
-COUNT = 60  # of each kind; benchmarks/reading/random_programs.py reads thousands
+COUNT = 25  # of each kind; benchmarks/reading/random_programs.py reads thousands
 EARLY = 0.02  # share of programs that only LinuxCNC refuses for an arc that begins early, at most: 1 of 650 was seen
 GOUGES = 0.04  # share of programs that only the reader refuses, at most: 23 of 1500 were seen
 

@@ -306,7 +306,7 @@ def test_arcs(text: str, end: list[float], centre: list[float], half_turns: floa
     st.booleans(),
     st.sampled_from([17, 18, 19]),
 )
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_r_and_centre_describe_the_same_arc(
     radius: float, first: float, sweep: float, clockwise: bool, plane: int
 ) -> None:

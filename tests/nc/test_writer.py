@@ -221,7 +221,7 @@ def spelled(text: str, rng: np.random.Generator) -> bytes:
 
 @pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_any_program(seed: int) -> None:
     rng = np.random.default_rng(seed)
     source = spelled(random_program(rng), rng)

@@ -2,8 +2,8 @@
 
 import numpy as np
 from motions import Asked, Moves, along, helix, machine, rest_to_rest, sample
-from numba import njit
 
+from planner.base.kernels import njit  # not numba's, which would choose another processor for all kernels
 from planner.verifier import verify
 from planner.verifier.pieces import reach_piece
 
@@ -37,7 +37,7 @@ def fault(verdict, begins):
     return text
 
 
-@njit
+@njit(cache=True)
 def distance_from(pieces, i, q):
     """How far a point q (3,) is from piece i [mm]."""
     return reach_piece(pieces, i, q, 0.0)[2]

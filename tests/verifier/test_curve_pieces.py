@@ -7,9 +7,9 @@ import pytest
 from curves import chord_error
 from judging import M, distance_from, fault, judge
 from motions import along, rest_to_rest, sample
-from numba import njit
 from scipy.optimize import brentq, minimize_scalar
 
+from planner.base.kernels import njit
 from planner.geometry.build import toolpath_from_program
 from planner.geometry.toolpath import Toolpath
 from planner.nc.reader import parse_program
@@ -82,7 +82,7 @@ def test_the_distance_from_a_curve_is_the_searched_one() -> None:
             assert distance_from(pieces, i, q) == pytest.approx(min(searched, *map(far, ends)), abs=1e-8)
 
 
-@njit
+@njit(cache=True)
 def part_within(pieces, i, q, radius):
     return reach_piece(pieces, i, q, radius)
 

@@ -178,7 +178,7 @@ def test_a_fault_in_the_middle_of_a_cruise_is_found_the_same_way_in_stretches(ki
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_verdict_on_a_motion_is_the_same_sample_by_sample(seed, monkeypatch):
-    points = walk(seed, longest=1.5, count=5)
+    points = walk(seed, longest=0.4, count=3)
     toolpath, motion = programmed(points), polyline(points, FEED, jerk=JERK)
     right = sample(motion, M.dt)
     asked = Asked(motion, M.dt)

@@ -129,7 +129,7 @@ def test_misprint_equation_13(Tk):
     V2=st.floats(5.0, 300.0),
     eps=st.floats(1e-3, 0.3),
 )
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_different_speeds_share_the_geometric_mean(theta, V1, V2, eps):
     """docs/papers.md, different programmed speeds: the vertex is missed by at most the tolerance, in the cubic zone too."""
     Tk = float(overlap_time(np.array(eps), np.sqrt(V1 * V2), np.sin(theta / 2), T1, T2))
@@ -174,7 +174,7 @@ def test_the_smaller_speed_would_be_unsafe():
     ratio=st.floats(0.05, 1.0),
     share=st.floats(0.0, 1.0),
 )
-@settings(max_examples=80)
+@settings(max_examples=40)
 def test_overlaps_within_limits_keep_them(theta, turn, T1, ratio, share):
     """The longest overlap at which two pulses at their limits stay within them, measured on the motion."""
     T2 = T1 * ratio

@@ -45,7 +45,7 @@ legs = st.lists(
 @pytest.mark.shows("fir", "exact: the filtered command by brute force")
 @pytest.mark.slow
 @given(legs=legs, T1=st.floats(2e-3, 0.1), ratio=st.floats(0.05, 1.0))
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_pieces_are_the_superposition_of_the_edges(legs, T1, ratio):
     """Lengths, speeds, gaps and directions as they come: short pulses, long gaps, none."""
     length, speed, gap, turn = (np.array(column) for column in zip(*legs, strict=True))

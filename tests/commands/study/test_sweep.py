@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -229,39 +230,32 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]], subprocess.Pop
             process.communicate()
 
 
-def sweep_on(address: str, job: Path, out: Path, count: int) -> list[str]:
-    """The command of so many points on a cluster."""
-    ranges = ["--vary", f"x.jerk=1e5:2e5:{count}", "--method", "stop"]
-    return [
-        sys.executable,
-        "-m",
-        "planner",
-        "sweep",
-        str(job),
-        "-o",
-        str(out),
-        *ranges,
-        "-q",
-        "--cluster",
-        address,
-    ]
+def sweep_on(address: str, job: Path, out: Path, count: int) -> tuple[object, ...]:
+    """What the command is given for so many points on a cluster."""
+    ranges = ("--vary", f"x.jerk=1e5:2e5:{count}", "--method", "stop")
+    return (job, "-o", out, *ranges, "-q", "--cluster", address)
 
 
 def killed_on_the_way(
-    command: list[str], out: Path, victim: subprocess.Popen[str]
-) -> tuple[int, int, str, str]:
+    given: tuple[object, ...], out: Path, victim: subprocess.Popen[str]
+) -> tuple[int, Result]:
     """A process of the cluster is killed when the sweep has its first points: how many were there, and how the command ended."""
-    env = os.environ | {"PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
-    ) as process:
-        while not (out / "points").exists() or not list((out / "points").glob("*.json")):
-            assert process.poll() is None, process.communicate()
+    there: list[int] = []
+
+    def kill() -> None:
+        while not (found := list((out / "points").glob("*.json"))) and not ended.is_set():
             time.sleep(0.02)
-        there = len(list((out / "points").glob("*.json")))
+        there.append(len(found))
         victim.send_signal(signal.SIGKILL)
-        said, err = process.communicate(timeout=300)
-    return there, process.returncode, said, err
+
+    ended, killer = threading.Event(), threading.Thread(target=kill)
+    killer.start()
+    try:
+        done = run(*given)
+    finally:
+        ended.set()
+        killer.join()
+    return there[0], done
 
 
 @pytest.mark.shows("sweep", "exact: a point is the plan with its settings, on processes and on a cluster")
@@ -273,10 +267,10 @@ def test_a_cluster_goes_on_without_a_worker_that_is_killed_and_ends_with_its_sch
     """Without its scheduler a sweep ends with a sentence; what was planned stays, and the same command goes on with it."""
     address, workers, scheduler = cluster
     out, count = tmp_path / "out", 16
-    there, code, said, err = killed_on_the_way(sweep_on(address, job, out, count), out, workers[0])
-    assert there < count  # it was on its way
-    assert code == 0, err
-    assert f"points   {count}: {count} passed" in said
+    there, done = killed_on_the_way(sweep_on(address, job, out, count), out, workers[0])
+    assert 0 < there < count  # it was on its way
+    assert done.exit_code == 0, done.stderr
+    assert f"points   {count}: {count} passed" in done.stdout
     table = pq.read_table(out / "sweep.parquet").to_pydict()
     np.testing.assert_allclose(table["axes.x.jerk"], np.linspace(1e5, 2e5, count))
     here = SweepFolder(tmp_path / "here", studied())
@@ -286,13 +280,12 @@ def test_a_cluster_goes_on_without_a_worker_that_is_killed_and_ends_with_its_sch
     assert workers[1].poll() is None
 
     out, count = tmp_path / "second", 24
-    command = sweep_on(address, job, out, count)
-    _, code, _, err = killed_on_the_way(command, out, scheduler)
+    _, done = killed_on_the_way(sweep_on(address, job, out, count), out, scheduler)
     there = len(list((out / "points").glob("*.json")))
     assert 0 < there < count
-    assert code == 3, err
-    assert "the scheduler has gone" in err
-    assert "Traceback" not in err, err
+    assert done.exit_code == 3, done.stderr
+    assert "the scheduler has gone" in done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
     done = run(job, "-o", out, "--vary", f"x.jerk=1e5:2e5:{count}", "--method", "stop", "-q", "--threads", 1)
     assert f"points   {count}, {there} of them planned before: {count} passed" in done.stdout
 

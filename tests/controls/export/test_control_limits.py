@@ -45,11 +45,11 @@ def lines_of(job: Candidates) -> list[str]:
 )
 def test_grbl_is_given_arcs_that_it_takes(arc: str, taken: bool, tmp_path: Path) -> None:
     """gcode.c of grbl 1.1; LinuxCNC takes all of these."""
-    job = job_of(f"{HEAD}{arc} F100\nG21 G17 G1 X30\nM2\n", "grbl", tmp_path)
+    job = job_of(f"{HEAD}{arc} F2000\nG21 G17 G1 X30\nM2\n", "grbl", tmp_path)
     assert (job.why_not == "") == taken, job.why_not
     if not taken:
         assert not any(line.startswith(("G2", "G3")) and "I" in line for line in lines_of(job))
-    assert job_of(f"{HEAD}{arc} F100\nG21 G17 G1 X30\nM2\n", "linuxcnc", tmp_path).why_not == ""
+    assert job_of(f"{HEAD}{arc} F2000\nG21 G17 G1 X30\nM2\n", "linuxcnc", tmp_path).why_not == ""
 
 
 @pytest.mark.parametrize(

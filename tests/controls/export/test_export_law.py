@@ -20,7 +20,7 @@ from planner.machine import Axis, load_machine
 from planner.nc.reading import Reading
 from planner.planning.job.plan import Plan
 
-QUICK, MANY = 24, 10
+QUICK, MANY = 16, 5
 
 
 def law(seeds: range, starts: int) -> set[tuple[str, str]]:
@@ -100,7 +100,7 @@ def test_what_an_extruder_does_is_kept(control: str, extruder: str) -> None:
     mill = machine()
     printer = mill.model_copy(update={"axes": mill.axes | {"e": axis}}) if extruder == "refuse" else mill
     chords = 0
-    for seed in range(12):
+    for seed in range(8):
         text = random_print(seed)
         program = planner.read_program(text=text, machine=printer, reading=Reading(extruder=extruder))
         plan = planner.plan(program, printer, method="kinematic")
@@ -111,7 +111,7 @@ def test_what_an_extruder_does_is_kept(control: str, extruder: str) -> None:
             out = job.written(one)[0].decode()
             assert not unknown_words(out, control)
             assert filament(out, control) == pytest.approx(filament(text, control), abs=1e-4), seed
-    assert chords > 4
+    assert chords > 2
 
 
 @pytest.mark.parametrize(

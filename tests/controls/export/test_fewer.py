@@ -108,7 +108,7 @@ STEPS = st.lists(
 @pytest.mark.shows(
     "smooth", "certified: the distance both ways and in order, by code that shares none with the writer"
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(STEPS, st.floats(30.0, 120.0), st.booleans())
 def test_the_path_stays_within_in_order(steps: list[tuple[float, ...]], part: float, arcs: bool) -> None:
     """Against the discrete Frechet distance of dense points, which is above that of the paths by their spacing at most."""

@@ -27,7 +27,7 @@ MACHINE = load_machine("plotter")
 @pytest.mark.shows("read-plotters", "exact: one drawing in several dialects is one path")
 @pytest.mark.slow
 @given(strokes=drawings, dialect=dialect)
-@settings(max_examples=80)
+@settings(max_examples=40)
 def test_every_dialect_reads_as_the_same_path(strokes, dialect):
     program = parse_program(written(strokes, dialect), source="drawing.plt")
     assert_same_path(path_of(program), expected(strokes), FINE)
@@ -37,6 +37,7 @@ def test_every_dialect_reads_as_the_same_path(strokes, dialect):
 @given(
     strokes=drawings, dialect=dialect, scale=st.sampled_from([0.1, 0.5, 2.54, 40.0]), mirrored=st.booleans()
 )
+@settings(max_examples=40)
 def test_user_units_scale_the_drawing(strokes, dialect, scale, mirrored):
     """With P1 at (100, 200): user coordinates are plotter units * scale, mirrored about x = 0 where asked."""
     sx = -scale if mirrored else scale
@@ -60,7 +61,7 @@ def test_user_units_scale_the_drawing(strokes, dialect, scale, mirrored):
 
 
 @given(strokes=drawings, dialect=dialect, seed=st.integers(0, 1000))
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_the_nc_text_of_a_drawing_reads_back_as_the_same_program(strokes, dialect, seed):
     """Blocks, dwells and events one by one; the path within 1e-6 mm; feeds as asked, rounded down by at most 0.1 %."""
     program = parse_program(written(strokes, dialect), MACHINE, source="drawing.plt")

@@ -1,9 +1,10 @@
-"""The page of a comparison: its columns are those of the motions, and a browser shows and hides them."""
+"""The page of a comparison: its columns are those of the motions, and a browser shows and hides them. Pages on paper."""
 
 from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import numpy as np
 import pytest
 
 import planner
+from planner.report.html.page import report_page
 from tests.commands.command_line import run
 from tests.report.html.columns import column
-from tests.report.html.in_browser import opened
+from tests.report.html.in_browser import opened, wait_for
 
 JOB = "G21 F3000\nG1 X40 Y3\nX45 Y30\nX0\n"
 
@@ -58,10 +60,14 @@ def test_a_file_that_is_no_page_is_kept(tmp_path: Path, file: Path) -> None:
         assert run("compare", job, "--method", "stop", "--report", page, "-q", *more).exit_code == 0
 
 
+@pytest.fixture
+def browser(chromium: Any, file: Path) -> Iterator[Any]:
+    with opened(chromium, file) as shown:
+        yield shown
+
+
 @pytest.mark.slow
-def test_a_browser_shows_and_hides_the_methods(file: Path) -> None:
-    pages = opened(file)
-    browser: Any = next(pages)  # or skipped
+def test_a_browser_shows_and_hides_the_methods(browser: Any) -> None:
     from selenium.webdriver.common.by import By
 
     assert browser.execute_script("return document.querySelectorAll('#title b').length") == 0
@@ -79,4 +85,43 @@ def test_a_browser_shows_and_hides_the_methods(file: Path) -> None:
         == "NC line"
     )
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
-    next(pages, None)
+
+
+# --- the page of a report, on paper: here for the browser that the page above has started -----------------------------------------
+
+
+@pytest.fixture
+def report(tmp_path: Path, chromium: Any) -> Iterator[Any]:
+    plan = planner.plan(planner.path([[0, 0], [20, 0], [20, 20]], feed=50.0), "mill", method="stop")
+    (tmp_path / "report.html").write_text(report_page(plan), encoding="utf-8")
+    with opened(chromium, tmp_path / "report.html") as shown:
+        yield shown
+
+
+@pytest.mark.slow
+def test_on_paper_the_path_of_a_report_is_the_first_picture(report: Any) -> None:
+    """A picture in WebGL leaves paper empty; the others are as wide as the paper, in the colours of a light ground."""
+    assert (
+        report.execute_script("return getComputedStyle(document.getElementById('first')).display") == "none"
+    )
+    report.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    report.execute_script("dispatchEvent(new Event('beforeprint'))")
+    names = "['path', 'first', 'scale', 'lines-box']"
+    shown = f"return {names}.map((id) => getComputedStyle(document.getElementById(id)).display)"
+    assert report.execute_script(shown) == ["none", "flex", "flex", "none"]
+    wide = "return [...document.querySelectorAll('#profile .main-svg')].map((svg) => svg.getBoundingClientRect().width)"
+    assert max(report.execute_script(wide)) <= report.execute_script("return document.body.clientWidth")
+    assert report.execute_script(
+        "return document.querySelector('#profile .main-svg').getAttribute('viewBox')"
+    )
+    inks = "return [...document.querySelectorAll('#profile svg text')].map((one) => one.style.fill)"
+    dark = {"name": "prefers-color-scheme", "value": "dark"}
+    report.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "screen", "features": [dark]})
+    report.refresh()
+    wait_for(report, "return document.body.dataset.ready")
+    on_screen = report.execute_script(inks)
+    assert "rgb(230, 233, 239)" in on_screen
+    report.execute_script("dispatchEvent(new Event('beforeprint'))")
+    assert set(report.execute_script(inks)) <= {"rgb(29, 36, 48)", "rgb(102, 112, 133)"}
+    report.execute_script("dispatchEvent(new Event('afterprint'))")
+    assert report.execute_script(inks) == on_screen

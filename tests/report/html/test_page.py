@@ -196,10 +196,11 @@ def test_report_needs_a_directory(job: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory, page: str) -> Iterator[Any]:
+def browser(tmp_path_factory: pytest.TempPathFactory, chromium: Any, page: str) -> Iterator[Any]:
     file = tmp_path_factory.mktemp("page") / "report.html"
     file.write_text(page, encoding="utf-8")
-    yield from opened(file)
+    with opened(chromium, file) as shown:
+        yield shown
 
 
 @pytest.mark.slow
@@ -227,11 +228,11 @@ def test_a_page_names_the_scripts_that_it_may_run(page: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_browser_runs_nothing_else(page: str, tmp_path: Path) -> None:
+def test_a_browser_runs_nothing_else(chromium: Any, page: str, tmp_path: Path) -> None:
     file = tmp_path / "attacked.html"  # as if something of a program were taken for HTML
     attack = "<script>document.title = 'ran'</script><img src=x onerror=\"document.title = 'ran'\">"
     file.write_text(page.replace("<header>", f"{attack}<header>"), encoding="utf-8")
-    for browser in opened(file):
+    with opened(chromium, file) as browser:
         assert browser.title == "job <b>.ngc · planned"
         said = [entry["message"] for entry in browser.get_log("browser")]
         assert sum("Content Security Policy" in one for one in said) >= 2, said

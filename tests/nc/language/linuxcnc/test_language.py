@@ -137,8 +137,8 @@ def test_programs_that_compute_agree_with_the_recorded_answers() -> None:
 @needs_oracle
 def test_random_programs_agree(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
-    texts = [Generator(rng).text() for _ in range(250)]
-    assert agreeing_blocks(texts, ask_oracle(written(texts, tmp_path, head=""), tmp_path)) > 1500
+    texts = [Generator(rng).text() for _ in range(100)]
+    assert agreeing_blocks(texts, ask_oracle(written(texts, tmp_path, head=""), tmp_path)) > 600
 
 
 # --- against programs written out -----------------------------------------------------------------------------------------------

@@ -33,6 +33,7 @@ DWELLING = frozenset((820, 860, 880, 890))  # cycles that need P
 PECKING = frozenset((730, 830))  # cycles that need Q
 FANUC_DWELLS = PECKING | {810, 850}  # cycles that dwell where P says so, on Fanuc's controls alone
 TAPPING = {740: -1, 840: 1}  # how the spindle must turn
+IN_STEPS = PECKING | TAPPING.keys()  # cycles that Q divides
 STOPPING = frozenset((860, 870, 880))  # cycles that stop the spindle, which must turn
 # The steps of each cycle from above the hole at R on: moves at the feed (down to the depth, back to R, out to
 # where the cycle ends) and fast (up to where it ends; beside, deep, in and away, of the back bore, whose feed
@@ -189,7 +190,7 @@ def _check_words(state: State, block: Block, words: dict[str, float], findings: 
     least = min(_infeeds(words, state)[c] for c in ("peck", "least"))
     text = f"{name} needs the depth of a peck as a Q word above 0"
     block.require(
-        least > 0 or (least == 0 and code in TAPPING) or code not in PECKING | TAPPING.keys(),
+        least > 0 or (least == 0 and code in TAPPING) or code not in IN_STEPS,
         text,
         "Q" * ("Q" in block.at),
     )
@@ -244,11 +245,7 @@ def _repeats(state: State, block: Block, hole: Hole) -> int:
     """L. Raises WordFault for more moves than a line may make."""
     count = next((c for c in "LK" if c in block.value and (c == "L" or _counts(state, block))), "")
     repeats = integer(block, count, 0 if state.fanuc else 1) if count else 1
-    pecks = (
-        (hole.clear - hole.bottom) / hole.least
-        if hole.code in PECKING | TAPPING.keys() and hole.least
-        else 0.0
-    )
+    pecks = (hole.clear - hole.bottom) / hole.least if hole.code in IN_STEPS and hole.least else 0.0
     text = f"G{codes.number(hole.code)} makes more than {STEPS_MAX} moves; correct {'Q' if pecks else 'L'}"
     block.require(repeats * (_PER_HOLE + _PER_PECK * pecks) <= STEPS_MAX, text)
     return repeats

@@ -86,6 +86,9 @@ _IDLE_ON_PRINTERS = {
 }
 _PRINTER = {17, 18, 82, 83, 84, *range(104, 108), 109, 114, 115, *range(117, 120)}
 _PRINTER |= {140, 190, 204, 220, 221, 400}
+# How far the radii at the ends of an arc may be apart on grbl: [mm], or up to so much [mm] the share.
+_RADII_APART, _RADII_APART_MAX, _RADII_SHARE = 0.004, 0.4, 0.9e-3  # of its 0.005, 0.5 and 0.001
+_R_ROUNDING = 1e-3  # [mm], of 2 R: single precision at 1 m is 6e-5
 
 GRBL = Control(
     name="grbl",
@@ -201,9 +204,6 @@ def _is_arc_of_grbl(row: Row, program: Program) -> bool:
     return True
 
 
-# How far the radii at the ends of an arc may be apart on grbl: [mm], or up to so much [mm] the share.
-_RADII_APART, _RADII_APART_MAX, _RADII_SHARE = 0.004, 0.4, 0.9e-3  # of its 0.005, 0.5 and 0.001
-_R_ROUNDING = 1e-3  # [mm], of 2 R: single precision at 1 m is 6e-5
 CONTROLS = {control.name: control for control in (GRBL, KLIPPER, MARLIN, LINUXCNC)}
 # What is said of codes that need a control built with an option.
 OPTIONS = {

@@ -7,7 +7,12 @@ What was tried to make them cheaper and brought nothing, so that it is not tried
                    the motion there; durations frozen as soon as the kinematics nearly hold: more iterations; products of
                    slacks and multipliers held at 0.3 of what is aimed at, not 0.1: as many (at 0.01 some windows do not end)
     windows        of 500 steps for short runs too, or overlapping by half as much: slower motions; all in lanes however few
-                   lanes are filled: arcs take longer
+                   lanes are filled: arcs take longer; all numbers of one step behind each other, in place of one array for each
+                   quantity: as long. Groups of long windows have no room in the cache (`benchmarks.solvers.search_kernel`),
+                   and it is how many bytes there are that counts, not where
+    threads        a shorter switch interval of Python's lock: as long
+    memory         freed arrays given back at once (MALLOC_TRIM_THRESHOLD_, MALLOC_MMAP_THRESHOLD_): a tenth less of 0.8 GB for a
+                   quarter to two fifths more CPU seconds
     first motion   on a coarser grid: cheaper on long programs of short blocks, dearer on random ones, some motions slower
     the verdict    fewer looks between setpoints where the acceleration is small: distances from vertices are those of
                    chords between looks, right motions were refused; the worst of each quantity found by a kernel of its

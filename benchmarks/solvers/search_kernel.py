@@ -5,7 +5,9 @@
 Every window that a plan asks for is written down. The longest ones are then solved again, processor seconds, the least of some
 passes: on single numbers; four of the same side by side in lanes, where none waits for another; and one of
 these groups with a single window in it; none where none can be in lanes (joint/window_solver.py). Reading
-windows into the kernel's memory and back is in all of it.
+windows into the kernel's memory and back is in all of it. The same is told of the longest windows of `SHORT` steps at most: the
+memory of a group, so many bytes a step and window, has room in a processor's cache then, where that of long windows has not.
+GFLOP/s are told of lines in three axes, by the count of the review: `FLOP` a step and iteration.
 """
 
 from __future__ import annotations
@@ -24,11 +26,15 @@ from benchmarks.record import markdown, write_results
 from planner.base.lanes import WIDTH
 from planner.base.threads import use_threads
 from planner.joint import groups
+from planner.joint.group import group_of
+from planner.joint.memory import work_of
 from planner.joint.window_solver import Asked, kind_of, solve_windows
 from planner.machine import Machine, load_machine
 from planner.nc.program import Program
 from planner.nc.reader import parse_program, read_program
 
+SHORT = 250  # steps
+FLOP = 6_400
 EXAMPLE = Path(planner.__file__).parent / "examples" / "bracket.ngc"
 
 
@@ -81,6 +87,16 @@ def least(asked: list[Asked], width: int, passes: int) -> float:
     return min(took)
 
 
+def bytes_of(asked: Asked) -> float:
+    """Memory of a group of windows like this one, per step and window [B]."""
+    sizes, group, motion, _, _ = group_of([asked.window] * WIDTH, [asked.tuning] * WIDTH, WIDTH)
+    arrays = [*group, *motion, *work_of(sizes, group)]
+    kept = {
+        one.__array_interface__["data"][0]: one.nbytes for one in arrays
+    }  # tangents of lines are their drifts
+    return sum(kept.values()) / (sizes.steps * WIDTH)
+
+
 def mean(values: list[float]) -> float:
     """Of these; NaN of none."""
     return sum(values) / len(values) if values else math.nan
@@ -95,6 +111,10 @@ def measured(name: str, windows: int, passes: int) -> dict[str, Any]:
     single = 1e6 * mean([least([one], 1, passes) for one in longest])
     lanes = 1e6 * mean([least([one] * WIDTH, WIDTH, passes) for one in straight])
     alone = 1e6 * mean([least([one], WIDTH, passes) for one in straight])
+    short = [one for one in seen if kind_of(one) is not None and len(one.window.u) <= SHORT]
+    short = sorted(short, key=lambda one: -len(one.window.u))[:windows]
+    of_short = 1e6 * mean([least([one] * WIDTH, WIDTH, passes) for one in short])
+    counted = straight and not straight[0].window.legs.radius.any() and straight[0].window.u.shape[1] == 4
     return {
         "job": name,
         "axes": longest[0].window.u.shape[1] - 1,
@@ -103,6 +123,9 @@ def measured(name: str, windows: int, passes: int) -> dict[str, Any]:
         "us_lanes": lanes,
         "us_alone": alone,
         "us_single": single,
+        "us_short": of_short,
+        "bytes": bytes_of(straight[0]) if straight else math.nan,
+        "gflops": FLOP / of_short / 1e3 if counted and short else math.nan,
     }
 
 
@@ -126,6 +149,9 @@ def main() -> None:
         "us, single numbers",
         "us, four in lanes",
         "us, one in lanes",
+        f"us, four in lanes, of {SHORT} steps at most",
+        "bytes a step",
+        "GFLOP/s of these",
     ]
     table = [
         [
@@ -134,8 +160,12 @@ def main() -> None:
             f"{row['windows']:,}",
             f"{row['steps']:,}",
             *(
-                "-" if math.isnan(us := row[f"us_{kind}"]) else f"{us:.2f}"
-                for kind in ("single", "lanes", "alone")
+                "-" if math.isnan(row[name]) else f"{row[name]:{form}}"
+                for name, form in (
+                    *((f"us_{kind}", ".2f") for kind in ("single", "lanes", "alone", "short")),
+                    ("bytes", ",.0f"),
+                    ("gflops", ".1f"),
+                )
             ),
         ]
         for row in rows

@@ -44,9 +44,8 @@ class Sizes:
     program_rows: int = _size(PARTS, 100_000, 50)
     idle_rows: int = _size(PARTS, 2_000, 20)  # the same at first, and as long as nothing moves
     turns_at_once: int = _size(PARTS, 500, 5)  # of loops and jumps between two looks at their number
-
-    placed_at_once: int = _size(PARTS, 20_000, 30)  # steps of a guess: 10 MB
-    looked_at_once: int = _size(PARTS, 20_000, 30)  # steps whose active limits are looked at: 8 MB
+    # steps that are placed on their legs, or whose active limits are looked at: 10 MB
+    steps_at_once: int = _size(PARTS, 20_000, 30)
 
     # Threads: they take 1 ms to begin; a point takes some us, a span 20 us to relax.
     grid_shared: int = _size(PARTS, 5_000, 10)  # points of a grid that are worth a thread

@@ -43,7 +43,7 @@ JUMP, SEEN = 3.0, 0.1
 # Gauss-Newton steps to the nearest place on an arc, from the place that the length travelled so far gives.
 NEAREST_STEPS = 5
 STATE = ("position", "velocity", "acceleration")
-PART = SIZES.placed_at_once  # steps
+PART = SIZES.steps_at_once
 
 
 class Cut(NamedTuple):
@@ -123,7 +123,8 @@ def guesses_from(
     count, legs = np.array([len(leg) for leg, _ in cuts]), np.array([len(run) for run in runs])
     leg = np.concatenate([leg for leg, _ in cuts]) + np.repeat(np.cumsum(legs) - legs, count)
     nodes = np.concatenate([times for _, times in cuts])
-    node = np.arange(len(leg)) + np.repeat(which, count)  # where each step begins
+    of_step = np.repeat(which, count)  # runs
+    node = np.arange(len(leg)) + of_step  # where each step begins
     h = nodes[node + 1] - nodes[node]
     last = np.cumsum(count + 1) - 1  # of each run
     first = last - count
@@ -142,21 +143,17 @@ def guesses_from(
     edges = begins[np.unique(np.minimum(part, len(begins) - 1))]
     for lo, hi in pairwise([*edges.tolist(), len(leg)]):
         steps = slice(lo, hi)
-        of_run = moves[np.repeat(which, count)[steps]]
-        place[steps] = _places(shapes, passed, leg[steps], h[steps], state, of_run, travelled, node[steps])
+        moving = moves[of_step[steps]]
+        place[steps] = _places(shapes, passed, leg[steps], h[steps], state, moving, travelled, node[steps])
     place += np.concatenate([run.offset[:-1] for run in runs])[leg, None]
     h_of, place_of = (np.split(column, np.cumsum(count)[:-1]) for column in (h, place))
     if exact is not None:
         inner = np.ones(len(nodes), dtype=bool)
         inner[first] = inner[last] = False
-        at, times = (
-            np.flatnonzero(inner),
-            np.concatenate(
-                [times[0] + np.cumsum(own[:-1]) for times, own in zip(vertex_times, h_of, strict=True)]
-            ),
-        )
+        times = [begin[0] + np.cumsum(own[:-1]) for begin, own in zip(vertex_times, h_of, strict=True)]
+        at, ends = np.flatnonzero(inner), np.concatenate(times)
         for lo in range(0, len(at), PART):
-            exactly = exact(times[lo : lo + PART])
+            exactly = exact(ends[lo : lo + PART])
             for m, name in enumerate(STATE):
                 state[at[lo : lo + PART], m] = getattr(exactly, name)
     return [

@@ -106,10 +106,10 @@ def joint_plan(
 ) -> Joint:
     """The plan of the joint search from a motion on a path.
 
-    planned: that motion alone: it is taken out, as nothing of it but its notes is kept while runs are searched, unless it stays
-    search : how finely, and up to which size
-    others : what there is where the search does not end, or the verdict finds something
-    motion : that on the path with its limits kept: it stays where the search does not end; else None
+    planned : that motion alone, which is taken out: of one that does not stay nothing but its notes is kept meanwhile
+    search  : how finely, and up to which size
+    others  : what there is where the search does not end, or the verdict finds something
+    motion  : that on the path with its limits kept: it stays where the search does not end; else None
     """
     stays, led = motion is not None, with_leads(job)
     with job.stage("search") as report:
@@ -195,9 +195,9 @@ def _time(made: Alone) -> float:
 
 def _parts(job: Job, found: FoundRun, start: SplicedRun | None) -> list[SplicedRun] | None:
     """The parts of the motion along a run; None where it has to be planned by itself; start: as of `parts_of`."""
-    if found.whole or (start and found.steps is not None):
+    if found.whole or (start is not None and found.steps is not None):
         return parts_of(job.toolpath, found, start)
-    return [start] if start else None
+    return None if start is None else [start]
 
 
 def _stays(job: Job, found: list[FoundRun], alone: Container[int]) -> Array:

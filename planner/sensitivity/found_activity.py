@@ -25,7 +25,7 @@ from planner.sensitivity.records import GridHistory
 
 TOLERANCE = "tolerance"
 STANDS = 1e-9  # shorter standstills are rounding of times [s]
-PART = SIZES.looked_at_once  # steps
+PART = SIZES.steps_at_once
 SEEN = 1e-3  # period of a trajectory that is looked at at given times only [s]
 PRICE_OF = (price.FEED, price.NORMAL, price.ROOM)  # of the shares behind those of the axes
 

@@ -9,6 +9,7 @@ import pytest
 from rest_motion import along_x
 
 from planner.joint.parts import Spliced, SplicedRun
+from planner.motion.axis_motion import OF_PIECES
 from planner.motion.slowed import Slowed
 
 JERK = 1e4
@@ -51,6 +52,15 @@ def test_lengths_do_not_depend_on_how_motions_are_given(slowed):
     other = Spliced(runs=tuple(runs))
     np.testing.assert_allclose(other.at(times, 1e-3).s, made.at(times, 1e-3).s, atol=1e-9)
     np.testing.assert_allclose(other.length[:3], made.length, atol=1e-9)
+
+
+def test_pieces_are_kept_once():
+    one, before = spliced(), {name: getattr(SECOND, name).copy() for name in OF_PIECES}
+    one.at(np.array([0.0, one.end]), 1e-3)
+    _, pieces = one._pieces
+    for name, column in before.items():
+        np.testing.assert_array_equal(getattr(SECOND, name), column)
+        assert np.shares_memory(getattr(SECOND, name), getattr(pieces, name))
 
 
 def test_at_no_times_it_has_columns_without_rows():

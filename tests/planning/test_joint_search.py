@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import weakref
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,7 +19,7 @@ from planner.joint.parts import FoundRun
 from planner.machine import Axis, Machine
 from planner.nc.program import Program
 from planner.nc.reader import parse_program
-from planner.planning import joint_search
+from planner.planning import attempts, joint_search
 from planner.planning.job.choice import beside
 from planner.planning.job.trace import Stages, Trace
 from planner.planning.methods.optimal import OptimalMethod
@@ -231,3 +232,25 @@ def test_more_effort_takes_no_more_time_where_shorter_steps_are_refused() -> Non
     assert plans[1].verdict.passed
     assert plans[1].cycle_time <= (1.0 + 1e-9) * plans[0].cycle_time
     assert [step.kept for step in traces["normal"].steps if step.name == "search"] == [True]
+
+
+def test_a_search_lets_go_of_the_motion_that_it_began_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its samples are half of what a long job has in memory, and nothing of them is delivered."""
+    begun, alive = list[weakref.ref[object]](), list[bool]()
+    first, search = attempts.first_motion, joint_search.searched_runs
+
+    def remembered(*given):  # type: ignore[no-untyped-def]
+        found = first(*given)
+        begun.append(weakref.ref(found.samples))
+        return found
+
+    def searched(*given, **named):  # type: ignore[no-untyped-def]
+        alive.append(begun[-1]() is not None)
+        return search(*given, **named)
+
+    monkeypatch.setattr(attempts, "first_motion", remembered)
+    monkeypatch.setattr(joint_search, "searched_runs", searched)
+    machine = planner.load_machine("mill")
+    program = planner.read_program(text="G21 G90 F3000\nG1 X20\nY10\nX0\n", machine=machine)
+    assert planner.plan(program, machine, effort="quick").require().cycle_time > 0
+    assert alive == [False]

@@ -87,7 +87,7 @@ import sys
 from pathlib import Path
 from benchmarks.mutants import trial
 from benchmarks.mutants.draw import Mutant
-trial.CPU = 1
+trial.CPU = 2
 found = []
 for new in sys.argv[2:]:
     mutant = Mutant(area="judge", file="summed.py", line=7, column=12, old=" + ", new=new)

@@ -26,9 +26,9 @@ from planner.planning.methods.tube import TubeMethod
 
 CORNER, ARCS = PROGRAMS["corner"], PROGRAMS["arcs"]
 # Share of the time by which ipopt may end elsewhere, begun where the own solver ended [-]; 1.6e-4 was seen (pushed: ipopt is slower).
-SAME = {"corner": 2e-4, "arcs": 2e-4, "pushed": 2e-4, "turned": 3e-4}
-# Fewer steps for those that ipopt takes longest on; where the rotary axis turns too it then finds 2.1e-4 less.
-COARSER = dict.fromkeys(("arcs", "pushed", "turned"), Cut(per_unit=2.0))
+SAME = {"corner": 2e-4, "arcs": 2e-4, "pushed": 2e-4, "turned": 2e-4}
+# Fewer steps for those that ipopt takes longest on.
+COARSER = dict.fromkeys(("arcs", "pushed"), Cut(per_unit=2.0))
 MISSED = own.MISSED
 
 

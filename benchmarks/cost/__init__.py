@@ -8,8 +8,7 @@ What was tried to make them cheaper and brought nothing, so that it is not tried
                    slacks and multipliers held at 0.3 of what is aimed at, not 0.1: as many (at 0.01 some windows do not end)
     windows        of 500 steps for short runs too, or overlapping by half as much: slower motions; all in lanes however few
                    lanes are filled: arcs take longer; all numbers of one step behind each other, in place of one array for each
-                   quantity: as long. Groups of long windows have no room in the cache (`benchmarks.solvers.search_kernel`),
-                   and it is how many bytes there are that counts, not where
+                   quantity: as long.
     threads        a shorter switch interval of Python's lock: as long
     memory         freed arrays given back at once (MALLOC_TRIM_THRESHOLD_, MALLOC_MMAP_THRESHOLD_): a tenth less of 0.8 GB for a
                    quarter to two fifths more CPU seconds

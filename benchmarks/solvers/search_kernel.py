@@ -5,9 +5,8 @@
 Every window that a plan asks for is written down. The longest ones are then solved again, processor seconds, the least of some
 passes: on single numbers; four of the same side by side in lanes, where none waits for another; and one of
 these groups with a single window in it; none where none can be in lanes (joint/window_solver.py). Reading
-windows into the kernel's memory and back is in all of it. The same is told of the longest windows of `SHORT` steps at most: the
-memory of a group, so many bytes a step and window, has room in a processor's cache then, where that of long windows has not.
-GFLOP/s are told of lines in three axes, by the count of the review: `FLOP` a step and iteration.
+windows into the kernel's memory and back is in all of it. The same is told of the longest windows of `SHORT` steps at most, whose
+group takes less memory: so many bytes a step and window.
 """
 
 from __future__ import annotations
@@ -34,7 +33,6 @@ from planner.nc.program import Program
 from planner.nc.reader import parse_program, read_program
 
 SHORT = 250  # steps
-FLOP = 6_400
 EXAMPLE = Path(planner.__file__).parent / "examples" / "bracket.ngc"
 
 
@@ -91,9 +89,8 @@ def bytes_of(asked: Asked) -> float:
     """Memory of a group of windows like this one, per step and window [B]."""
     sizes, group, motion, _, _ = group_of([asked.window] * WIDTH, [asked.tuning] * WIDTH, WIDTH)
     arrays = [*group, *motion, *work_of(sizes, group)]
-    kept = {
-        one.__array_interface__["data"][0]: one.nbytes for one in arrays
-    }  # tangents of lines are their drifts
+    # tangents of lines are their drifts
+    kept = {one.__array_interface__["data"][0]: one.nbytes for one in arrays}
     return sum(kept.values()) / (sizes.steps * WIDTH)
 
 
@@ -114,7 +111,6 @@ def measured(name: str, windows: int, passes: int) -> dict[str, Any]:
     short = [one for one in seen if kind_of(one) is not None and len(one.window.u) <= SHORT]
     short = sorted(short, key=lambda one: -len(one.window.u))[:windows]
     of_short = 1e6 * mean([least([one] * WIDTH, WIDTH, passes) for one in short])
-    counted = straight and not straight[0].window.legs.radius.any() and straight[0].window.u.shape[1] == 4
     return {
         "job": name,
         "axes": longest[0].window.u.shape[1] - 1,
@@ -125,7 +121,6 @@ def measured(name: str, windows: int, passes: int) -> dict[str, Any]:
         "us_single": single,
         "us_short": of_short,
         "bytes": bytes_of(straight[0]) if straight else math.nan,
-        "gflops": FLOP / of_short / 1e3 if counted and short else math.nan,
     }
 
 
@@ -151,7 +146,6 @@ def main() -> None:
         "us, one in lanes",
         f"us, four in lanes, of {SHORT} steps at most",
         "bytes a step",
-        "GFLOP/s of these",
     ]
     table = [
         [
@@ -164,7 +158,6 @@ def main() -> None:
                 for name, form in (
                     *((f"us_{kind}", ".2f") for kind in ("single", "lanes", "alone", "short")),
                     ("bytes", ",.0f"),
-                    ("gflops", ".1f"),
                 )
             ),
         ]
